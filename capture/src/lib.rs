@@ -1,0 +1,18 @@
+//! Frames, clocks, mailboxes, and where frames come from and go to.
+//!
+//! A [`Frame`] is one image as the sensor delivered it: never resampled, its pixels shared and not copied. A
+//! [`Camera`] is anything that delivers frames in time: a device, a folder of images, a recording, a simulated sensor.
+
+pub mod camera;
+pub mod clock;
+pub mod control;
+pub mod frame;
+pub mod pixel_format;
+pub mod pool;
+
+pub use camera::{Camera, CaptureError, StreamInfo};
+pub use clock::Timestamp;
+pub use control::{Control, ControlInfo, ControlReport, ControlValue};
+pub use frame::{DepthFrame, Frame};
+pub use pixel_format::{ColorEncoding, PixelFormat, YuvMatrix, YuvRange};
+pub use pool::{FramePool, PixelBuffer};

@@ -1,0 +1,54 @@
+//! How the bytes of a frame are to be read.
+
+/// Layout of a frame's bytes, named after the V4L2 code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PixelFormat {
+    /// 4:2:2, 8 bit, `Y0 U Y1 V`, 2 bytes a pixel.
+    Yuyv,
+    /// 4:2:2, 8 bit, `U Y0 V Y1`, 2 bytes a pixel.
+    Uyvy,
+    /// 4:2:0, 8 bit: a plane of Y, then a plane of interleaved `U V` at half resolution.
+    Nv12,
+    /// 8 bit luminance.
+    Grey,
+    /// 16 bit luminance, little endian.
+    Y16,
+    /// 16 bit depth, little endian; 0 = no measurement. The frame holds the unit.
+    Z16,
+    /// 8 bit R'G'B', 3 bytes a pixel.
+    Rgb24,
+    /// One JPEG image a frame (Motion JPEG).
+    Mjpg,
+}
+
+/// Which luma coefficients made Y′CbCr from R′G′B′.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum YuvMatrix {
+    /// ITU-R BT.601: standard definition video and JPEG.
+    #[default]
+    Bt601,
+    /// ITU-R BT.709: high definition video.
+    Bt709,
+}
+
+/// Which code values stand for black and white in Y′CbCr.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum YuvRange {
+    /// 0…255 for all channels, as JPEG has it.
+    Full,
+    /// 16…235 for Y′, 16…240 for Cb and Cr.
+    #[default]
+    Limited,
+}
+
+/// The colour encoding of a Y′CbCr frame, as the device reports it. Ignored for formats without chroma subsampling.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+pub struct ColorEncoding {
+    /// Luma coefficients.
+    pub matrix: YuvMatrix,
+    /// Code range.
+    pub range: YuvRange,
+}

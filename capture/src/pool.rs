@@ -1,0 +1,1 @@
+//! Pixel memory that goes back to where it came from.
