@@ -1,1 +1,34 @@
-//! TODO
+//! Things, materials, lights, meshes and the session file: plain data, no GPU.
+//!
+//! | module | what is there |
+//! | --- | --- |
+//! | [`world`] | real or virtual |
+//! | [`pose`] | where a thing is: in the world, on a marker, a body or a board |
+//! | [`mesh`] | triangles, their bounds |
+//! | [`material`], [`texture`] | glTF metallic-roughness with transmission |
+//! | [`light`] | spots and rectangles |
+//! | [`thing`] | things and the [`Scene`] of them |
+//! | [`shape`] | box, sphere, plane, ring, Utah teapot |
+//! | [`import`] | glTF, Wavefront OBJ, Stanford PLY |
+//! | [`validity`] | what is wrong with a mesh |
+//! | [`sample`] | points spread over surfaces |
+//!
+//! World: right-handed, +Z up, metres. Colours are linear RGB in the see-through camera's own primaries.
+
+pub mod bounds;
+pub mod light;
+pub mod material;
+pub mod mesh;
+pub mod pose;
+pub mod texture;
+pub mod thing;
+pub mod world;
+
+pub use bounds::{Aabb, Sphere};
+pub use light::{Light, LightKind};
+pub use material::{AlphaMode, Material};
+pub use mesh::{Mesh, MeshError, Part};
+pub use pose::{Pose, Similarity};
+pub use texture::{ColorSpace, Image, Texture};
+pub use thing::{Scene, Thing};
+pub use world::World;
