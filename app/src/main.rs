@@ -1,1 +1,44 @@
-fn main() {}
+//! The `coshade` command line.
+
+mod command;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Mixed reality in which real and virtual things shade each other.
+#[derive(Parser)]
+#[command(name = "coshade", version, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Info(command::info::Args),
+    Record(command::record::Args),
+    Replay(command::replay::Args),
+    Compare(command::compare::Args),
+    Doctor(command::doctor::Args),
+}
+
+fn main() -> ExitCode {
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn"));
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+    let result = match Cli::parse().command {
+        Command::Info(args) => command::info::run(&args),
+        Command::Record(args) => command::record::run(&args),
+        Command::Replay(args) => command::replay::run(&args),
+        Command::Compare(args) => command::compare::run(&args),
+        Command::Doctor(args) => command::doctor::run(&args),
+    };
+    match result {
+        Ok(outcome) => outcome,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
