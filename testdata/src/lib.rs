@@ -4,6 +4,8 @@
 //! skipped: it returns early, and a line is appended to the file `$COSHADE_SKIPPED` (if set) so that `scripts/test`
 //! can list what was not tested.
 
+pub mod mutate;
+
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
