@@ -13,6 +13,6 @@ pub mod pool;
 pub use camera::{Camera, CaptureError, StreamInfo};
 pub use clock::Timestamp;
 pub use control::{Control, ControlInfo, ControlReport, ControlValue};
-pub use frame::{DepthFrame, Frame};
+pub use frame::{DepthFrame, Frame, FrameError};
 pub use pixel_format::{ColorEncoding, PixelFormat, YuvMatrix, YuvRange};
-pub use pool::{FramePool, PixelBuffer};
+pub use pool::{FramePool, PixelBuffer, PixelBufferMut};

@@ -1,5 +1,7 @@
 //! How the bytes of a frame are to be read.
 
+use std::fmt;
+
 /// Layout of a frame's bytes, named after the V4L2 code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -20,6 +22,33 @@ pub enum PixelFormat {
     Rgb24,
     /// One JPEG image a frame (Motion JPEG).
     Mjpg,
+}
+
+impl PixelFormat {
+    /// Bytes a pixel takes in a row (of the Y plane for NV12); 0 for MJPG, which has no rows.
+    pub const fn bytes_per_row_pixel(self) -> u32 {
+        match self {
+            Self::Mjpg => 0,
+            Self::Nv12 | Self::Grey => 1,
+            Self::Yuyv | Self::Uyvy | Self::Y16 | Self::Z16 => 2,
+            Self::Rgb24 => 3,
+        }
+    }
+}
+
+impl fmt::Display for PixelFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Yuyv => "YUYV",
+            Self::Uyvy => "UYVY",
+            Self::Nv12 => "NV12",
+            Self::Grey => "GREY",
+            Self::Y16 => "Y16",
+            Self::Z16 => "Z16",
+            Self::Rgb24 => "RGB24",
+            Self::Mjpg => "MJPG",
+        })
+    }
 }
 
 /// Which luma coefficients made Y′CbCr from R′G′B′.
