@@ -10,6 +10,7 @@
 //! | [`thing`] | things and the [`Scene`] of them |
 //! | [`shape`] | box, sphere, plane, ring, Utah teapot |
 //! | [`import`] | glTF, Wavefront OBJ, Stanford PLY |
+//! | [`topology`] | whether a surface is closed |
 //! | [`validity`] | what is wrong with a mesh |
 //! | [`sample`] | points spread over surfaces |
 //!
@@ -20,8 +21,10 @@ pub mod light;
 pub mod material;
 pub mod mesh;
 pub mod pose;
+pub mod shape;
 pub mod texture;
 pub mod thing;
+pub mod topology;
 pub mod world;
 
 pub use bounds::{Aabb, Sphere};
@@ -29,6 +32,7 @@ pub use light::{Light, LightKind};
 pub use material::{AlphaMode, Material};
 pub use mesh::{Mesh, MeshError, Part};
 pub use pose::{Pose, Similarity};
+pub use shape::{Shape, ShapeError};
 pub use texture::{ColorSpace, Image, Texture};
 pub use thing::{Scene, Thing};
 pub use world::World;
