@@ -1,0 +1,162 @@
+//! OpenEXR: every flat layer at full resolution, of single- and multi-part files, scan lines and tiles.
+//!
+//! Layers follow the usual naming: channel `real.R` is `R` of layer `real`; a channel without a prefix belongs to the
+//! layer named like its part, or to the unnamed layer if the file has one part. The pixels are those of the data
+//! window; [`Window`] says where it sat.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use exr::meta::MetaData;
+use exr::prelude::{AnyChannel, FlatSamples, ReadChannels, ReadLayers, Vec2};
+
+use super::image::{Channel, Image, LayeredImage, Window};
+use super::{ImageError, ReadLimits};
+
+const PART: &str = "EXR";
+
+pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<LayeredImage, ImageError> {
+    let broken = |error: exr::error::Error| ImageError::decode(path, PART, error);
+    check_headers(path, bytes, limits)?;
+
+    // One thread: a panic in the crate's pool could not be returned as an error.
+    let file = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .non_parallel()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(broken)?;
+
+    let display = file.attributes.display_window;
+    let parts = file.layer_data.len();
+    let mut result = LayeredImage::default();
+    for part in file.layer_data {
+        let Vec2(x, y) = part.attributes.layer_position;
+        let window = Window {
+            data_origin_px: [x, y],
+            display_origin_px: [display.position.0, display.position.1],
+            display_size_px: [display.size.0, display.size.1],
+        };
+        let name = part
+            .attributes
+            .layer_name
+            .map(|name| name.to_string())
+            .unwrap_or_default();
+        let own_name = if parts > 1 { name.as_str() } else { "" };
+        for (prefix, mut channels) in group_by_prefix(part.channel_data.list.into_vec(), &mut result.notes) {
+            let layer = layer_name(&result, own_name, &prefix);
+            Image::sort_channels(&mut channels);
+            let image = Image::new(part.size.0, part.size.1, channels)
+                .map_err(|error| ImageError::decode(path, PART, format!("layer {layer:?}: {error}")))?;
+            let pushed = result.push(&layer, image.with_window(window));
+            pushed.map_err(|error| ImageError::decode(path, PART, error))?;
+        }
+    }
+    result.note_non_finite();
+    Ok(result)
+}
+
+/// Refuses what cannot be read, and sizes beyond the limits, before any pixel is allocated.
+fn check_headers(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<(), ImageError> {
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false)
+        .map_err(|error| ImageError::decode(path, PART, error))?;
+    let mut total_bytes = 0u64;
+    for header in &meta.headers {
+        if header.deep {
+            return Err(ImageError::unsupported(
+                path,
+                "holds deep data (several samples per pixel); flatten it, for instance with oiiotool --flatten",
+            ));
+        }
+        for channel in &header.channels.list {
+            let (name, Vec2(x, y)) = (&channel.name, channel.sampling);
+            if (x, y) != (1, 1) {
+                return Err(ImageError::unsupported(
+                    path,
+                    format!(
+                        "channel {name} is subsampled ({x}x{y}), as in luminance-chroma files; write it with R G B"
+                    ),
+                ));
+            }
+            let base = name.to_string();
+            let base = base.rsplit('.').next().unwrap_or_default();
+            if matches!(base, "RY" | "BY") {
+                return Err(ImageError::unsupported(
+                    path,
+                    format!("channel {name} holds colour as luminance-chroma; write it with R G B"),
+                ));
+            }
+        }
+        let (width, height, channels) = (
+            header.layer_size.0,
+            header.layer_size.1,
+            header.channels.list.len(),
+        );
+        total_bytes = total_bytes.saturating_add(limits.check(path, width, height, channels)?);
+        if total_bytes > limits.max_decoded_bytes {
+            return Err(ImageError::TooLarge {
+                path: path.into(),
+                width,
+                height,
+                channels: meta.headers.iter().map(|header| header.channels.list.len()).sum(),
+                limit_bytes: limits.max_decoded_bytes,
+                limit_side_px: limits.max_side_px,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Splits `real.R` into layer and channel; layers in the order of their first channel.
+fn group_by_prefix(
+    channels: Vec<AnyChannel<FlatSamples>>,
+    notes: &mut Vec<String>,
+) -> Vec<(String, Vec<Channel>)> {
+    let mut groups: Vec<(String, Vec<Channel>)> = Vec::new();
+    for channel in channels {
+        let full_name = channel.name.to_string();
+        let (prefix, name) = full_name.rsplit_once('.').unwrap_or(("", &full_name));
+        let samples = floats(channel.sample_data, &full_name, notes);
+        let channel = Channel {
+            name: name.into(),
+            samples,
+        };
+        match groups.iter_mut().find(|(existing, _)| existing == prefix) {
+            Some((_, members)) => members.push(channel),
+            None => groups.push((prefix.into(), vec![channel])),
+        }
+    }
+    groups
+}
+
+fn floats(samples: FlatSamples, name: &str, notes: &mut Vec<String>) -> Vec<f32> {
+    match samples {
+        FlatSamples::F32(samples) => samples,
+        FlatSamples::F16(samples) => samples.into_iter().map(|sample| sample.to_f32()).collect(),
+        FlatSamples::U32(samples) => {
+            let rounded = samples
+                .iter()
+                .filter(|&&sample| (sample as f32) as u64 != u64::from(sample))
+                .count();
+            if rounded > 0 {
+                notes.push(format!(
+                    "channel {name}: {rounded} integers do not fit a float and are rounded"
+                ));
+            }
+            samples.into_iter().map(|sample| sample as f32).collect()
+        }
+    }
+}
+
+/// The prefix, or the part's name without one; both if another part has that name already.
+fn layer_name(taken: &LayeredImage, part: &str, prefix: &str) -> String {
+    let short = if prefix.is_empty() { part } else { prefix };
+    if taken.layer(short).is_some() && !part.is_empty() && short != part {
+        format!("{part}.{prefix}")
+    } else {
+        short.into()
+    }
+}
