@@ -6,13 +6,17 @@
 pub mod camera;
 pub mod clock;
 pub mod control;
+pub mod convert;
 pub mod frame;
+pub mod latest;
 pub mod pixel_format;
 pub mod pool;
 
 pub use camera::{Camera, CaptureError, StreamInfo};
 pub use clock::Timestamp;
 pub use control::{Control, ControlInfo, ControlReport, ControlValue};
+pub use convert::{ChromaUpsampling, ConvertError, Converter};
 pub use frame::{DepthFrame, Frame, FrameError};
+pub use latest::{LatestError, LatestReceiver, LatestSender, latest};
 pub use pixel_format::{ColorEncoding, PixelFormat, YuvMatrix, YuvRange};
 pub use pool::{FramePool, PixelBuffer, PixelBufferMut};
