@@ -135,7 +135,9 @@ impl Ndc {
 
     /// The same point in camera coordinates of an image of `size_px`.
     pub fn to_camera(self, size_px: [u32; 2]) -> CameraPx {
-        Uv::new((self.0.x + 1.0) / 2.0, (1.0 - self.0.y) / 2.0).to_raster(size_px).to_camera()
+        Uv::new((self.0.x + 1.0) / 2.0, (1.0 - self.0.y) / 2.0)
+            .to_raster(size_px)
+            .to_camera()
     }
 }
 
@@ -168,7 +170,10 @@ mod tests {
         let center = CameraPx::new(0.0, 0.0);
         assert_eq!(center.to_raster(), RasterPx::center_of(0, 0));
         assert_eq!(center.to_uv(SIZE), Uv::new(0.5 / 640.0, 0.5 / 480.0));
-        assert_eq!(center.to_ndc(SIZE), Ndc::new(1.0 / 640.0 - 1.0, 1.0 - 1.0 / 480.0));
+        assert_eq!(
+            center.to_ndc(SIZE),
+            Ndc::new(1.0 / 640.0 - 1.0, 1.0 - 1.0 / 480.0)
+        );
         assert_eq!(center.to_apriltag(), Vector2::new(0.5, 0.5));
         assert_eq!(center.to_colmap(), Vector2::new(0.5, 0.5));
         assert_eq!(center.to_mitsuba_film(), Vector2::new(0.5, 0.5));
@@ -198,7 +203,10 @@ mod tests {
         let half = Vector2::new(0.5, 0.5);
         assert_eq!(CameraPx::new(0.5, 0.5).scaled(half), CameraPx::new(0.0, 0.0));
         assert_eq!(CameraPx::new(-0.5, -0.5).scaled(half), CameraPx::new(-0.5, -0.5));
-        assert_eq!(CameraPx::new(639.5, 479.5).scaled(half), CameraPx::new(319.5, 239.5));
+        assert_eq!(
+            CameraPx::new(639.5, 479.5).scaled(half),
+            CameraPx::new(319.5, 239.5)
+        );
     }
 
     #[test]
