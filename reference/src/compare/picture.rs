@@ -62,11 +62,9 @@ pub struct DifferencePicture {
 pub(super) fn signed_difference(prepared: &Prepared<'_>, clip: Option<f32>) -> Vec<Option<f32>> {
     let clipped = |value: f32| clip.map_or(value, |clip| value.min(clip));
     let at = |i: usize| {
-        let differences = prepared
-            .a
-            .iter()
-            .zip(&prepared.b)
-            .map(|(a, b)| clipped(a[i]) - clipped(b[i]));
+        let difference =
+            |(a, b): (&&[f32], &&[f32])| (clipped(a[i]) - clipped(b[i])).clamp(f32::MIN, f32::MAX);
+        let differences = prepared.a.iter().zip(&prepared.b).map(difference);
         prepared.valid[i].then(|| {
             differences
                 .max_by(|a, b| a.abs().total_cmp(&b.abs()))

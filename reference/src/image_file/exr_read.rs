@@ -5,31 +5,21 @@
 //! window; [`Window`] says where it sat.
 
 use std::io::Cursor;
+use std::panic::catch_unwind;
 use std::path::Path;
 
 use exr::meta::MetaData;
-use exr::prelude::{AnyChannel, FlatSamples, ReadChannels, ReadLayers, Vec2};
+use exr::prelude::{AnyChannel, FlatImage, FlatSamples, ReadChannels, ReadLayers, Vec2};
 
 use super::image::{Channel, Image, LayeredImage, Window};
-use super::{ImageError, ReadLimits};
+use super::{ImageError, ReadLimits, exr_dwa};
 
 const PART: &str = "EXR";
 
 pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<LayeredImage, ImageError> {
-    let broken = |error: exr::error::Error| ImageError::decode(path, PART, error);
     check_headers(path, bytes, limits)?;
 
-    // One thread: a panic in the crate's pool could not be returned as an error.
-    let file = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .all_layers()
-        .all_attributes()
-        .non_parallel()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(broken)?;
-
+    let file = decode(path, bytes)?;
     let display = file.attributes.display_window;
     let parts = file.layer_data.len();
     let mut result = LayeredImage::default();
@@ -57,6 +47,30 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Lay
     }
     result.note_non_finite();
     Ok(result)
+}
+
+/// The crate's decoder, with its panics made errors: exr 1.74 overflows on broken B44 blocks when built with checks.
+fn decode(path: &Path, bytes: &[u8]) -> Result<FlatImage, ImageError> {
+    // One thread: a panic in the crate's own pool would end the process.
+    let decode = || {
+        exr_dwa::check_sections(bytes)?;
+        exr::prelude::read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels()
+            .all_layers()
+            .all_attributes()
+            .non_parallel()
+            .from_buffered(Cursor::new(bytes))
+    };
+    match catch_unwind(decode) {
+        Ok(result) => result.map_err(|error| ImageError::decode(path, PART, error)),
+        Err(_) => Err(ImageError::decode(
+            path,
+            PART,
+            "the decoder failed on its compressed pixels",
+        )),
+    }
 }
 
 /// Refuses what cannot be read, and sizes beyond the limits, before any pixel is allocated.

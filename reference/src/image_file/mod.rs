@@ -7,6 +7,7 @@
 //! [`read`] looks at the first bytes, not at the extension. [`ReadLimits`] bounds what a header may ask for.
 
 mod error;
+mod exr_dwa;
 mod exr_read;
 mod exr_write;
 mod image;

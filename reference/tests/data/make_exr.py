@@ -41,6 +41,8 @@ def files():
         "zip": OpenEXR.ZIP_COMPRESSION,
         "piz": OpenEXR.PIZ_COMPRESSION,
         "pxr24": OpenEXR.PXR24_COMPRESSION,
+        "b44": OpenEXR.B44_COMPRESSION,
+        "dwaa": OpenEXR.DWAA_COMPRESSION,
     }
     for name, compression in kinds.items():
         yield f"{name}.exr", header(compression=compression), rgb(np.float16)
