@@ -73,10 +73,7 @@ impl From<&KeyPath> for KeyPath {
 }
 
 fn parse_step(step: &str) -> Step {
-    let digits = step
-        .strip_prefix('[')
-        .and_then(|rest| rest.strip_suffix(']'))
-        .unwrap_or(step);
+    let digits = step.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')).unwrap_or(step);
     match digits.parse() {
         Ok(index) => Step::Index(index),
         Err(_) => Step::Key(step.to_owned()),
@@ -117,10 +114,7 @@ mod tests {
         let path = KeyPath::root().key("thing").index(2).key("pose").key("a key");
         assert_eq!(path.to_string(), "thing[2].pose.\"a key\"");
         assert_eq!(KeyPath::root().to_string(), "");
-        assert_eq!(
-            KeyPath::root().key("a\u{1b}[2J\n").to_string(),
-            "\"a\\u{1b}[2J\\n\""
-        );
+        assert_eq!(KeyPath::root().key("a\u{1b}[2J\n").to_string(), "\"a\\u{1b}[2J\\n\"");
     }
 
     #[test]

@@ -34,6 +34,7 @@ mod schema;
 mod source;
 mod suggest;
 mod tree;
+mod write;
 
 use std::path::Path;
 

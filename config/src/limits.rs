@@ -20,26 +20,17 @@ const MAX_VALUES: usize = 500_000;
 
 /// A regular file's text.
 pub(crate) fn read_text(path: &Path) -> Result<String, Error> {
-    let failed = |source| Error::Read {
-        path: path.to_path_buf(),
-        source,
-    };
+    let failed = |source| Error::Read { path: path.to_path_buf(), source };
     // Asked before opening: opening a pipe that nobody writes to would wait forever.
     let metadata = std::fs::metadata(path).map_err(failed)?;
     if !metadata.is_file() {
-        return Err(Error::NotAFile {
-            path: path.to_path_buf(),
-        });
+        return Err(Error::NotAFile { path: path.to_path_buf() });
     }
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(failed)?;
-    file.take(MAX_FILE_BYTES + 1)
-        .read_to_end(&mut bytes)
-        .map_err(failed)?;
+    file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
     if bytes.len() as u64 > MAX_FILE_BYTES {
-        return Err(Error::TooLarge {
-            path: path.to_path_buf(),
-        });
+        return Err(Error::TooLarge { path: path.to_path_buf() });
     }
     decode(bytes, path)
 }
@@ -75,10 +66,7 @@ pub(crate) fn check_structure(text: &str) -> Result<(), Exceeded> {
             b'#' => line_end(bytes, at),
             b'"' | b'\'' => string_end(bytes, at),
             _ => {
-                counts.count(byte).map_err(|message| Exceeded {
-                    span: at..at + 1,
-                    message,
-                })?;
+                counts.count(byte).map_err(|message| Exceeded { span: at..at + 1, message })?;
                 at + 1
             }
         };
@@ -146,9 +134,7 @@ fn string_end(bytes: &[u8], at: usize) -> usize {
             b'\\' if quote == b'"' => i += 2,
             b'\n' if !multi_line => return at + i,
             _ if byte == quote
-                && rest
-                    .get(i..i + closing)
-                    .is_some_and(|end| end.iter().all(|&b| b == quote)) =>
+                && rest.get(i..i + closing).is_some_and(|end| end.iter().all(|&b| b == quote)) =>
             {
                 return at + i + closing;
             }

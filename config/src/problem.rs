@@ -116,6 +116,8 @@ impl Problems {
     /// Sorts them by place and keeps the first hundred.
     pub(crate) fn sorted(mut list: Vec<Problem>) -> Self {
         list.sort_by_key(|problem| (problem.line, problem.column));
+        // A key that two variants share is checked against both.
+        list.dedup();
         let unlisted = list.len().saturating_sub(MAX_PROBLEMS);
         list.truncate(MAX_PROBLEMS);
         Self { list, unlisted }

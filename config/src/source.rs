@@ -8,7 +8,7 @@ use std::sync::Arc;
 const EXCERPT_CHARS: usize = 110;
 
 /// Some editors begin a file with it; it is no column.
-const BYTE_ORDER_MARK: char = '\u{feff}';
+pub(crate) const BYTE_ORDER_MARK: char = '\u{feff}';
 
 /// A text and the file it came from. Cheap to clone.
 #[derive(Clone, Debug)]
@@ -32,16 +32,8 @@ pub(crate) struct Excerpt {
 
 impl Source {
     pub(crate) fn new(path: &Path, text: &str) -> Self {
-        let starts = text
-            .bytes()
-            .enumerate()
-            .filter(|&(_, byte)| byte == b'\n')
-            .map(|(at, _)| at + 1);
-        Self {
-            path: path.into(),
-            text: text.into(),
-            line_starts: std::iter::once(0).chain(starts).collect(),
-        }
+        let starts = text.bytes().enumerate().filter(|&(_, byte)| byte == b'\n').map(|(at, _)| at + 1);
+        Self { path: path.into(), text: text.into(), line_starts: std::iter::once(0).chain(starts).collect() }
     }
 
     pub(crate) fn text(&self) -> &str {
@@ -61,47 +53,27 @@ impl Source {
     pub(crate) fn line_and_column(&self, offset: usize) -> (usize, usize) {
         let line = self.line_index(offset);
         let before = self.slice(&(self.line_start(line)..offset.min(self.text.len())));
-        (
-            line + 1,
-            before.trim_start_matches(BYTE_ORDER_MARK).chars().count() + 1,
-        )
+        (line + 1, before.trim_start_matches(BYTE_ORDER_MARK).chars().count() + 1)
     }
 
     /// The line where a span starts, with carets under the part of the span that lies on it.
     pub(crate) fn excerpt(&self, span: &Range<usize>) -> Excerpt {
         let index = self.line_index(span.start);
         let start = self.line_start(index);
-        let end = self
-            .line_starts
-            .get(index + 1)
-            .copied()
-            .unwrap_or(self.text.len());
-        let line = self
-            .slice(&(start..end))
-            .trim_start_matches(BYTE_ORDER_MARK)
-            .trim_end_matches(['\n', '\r']);
+        let end = self.line_starts.get(index + 1).copied().unwrap_or(self.text.len());
+        let line =
+            self.slice(&(start..end)).trim_start_matches(BYTE_ORDER_MARK).trim_end_matches(['\n', '\r']);
         let column = self.line_and_column(span.start).1 - 1;
         let on_line = self.slice(&(span.start..span.end.min(start + line.len()).max(span.start)));
         let first = column.saturating_sub(EXCERPT_CHARS / 2);
-        let shown: String = line
-            .chars()
-            .skip(first)
-            .take(EXCERPT_CHARS)
-            .map(printable)
-            .collect();
+        let shown: String = line.chars().skip(first).take(EXCERPT_CHARS).map(printable).collect();
         let caret = column - first;
         let room = shown.chars().count().saturating_sub(caret);
-        Excerpt {
-            line: shown,
-            caret,
-            carets: on_line.chars().count().min(room).max(1),
-        }
+        Excerpt { line: shown, caret, carets: on_line.chars().count().min(room).max(1) }
     }
 
     fn line_index(&self, offset: usize) -> usize {
-        self.line_starts
-            .partition_point(|&start| start <= offset)
-            .saturating_sub(1)
+        self.line_starts.partition_point(|&start| start <= offset).saturating_sub(1)
     }
 
     fn line_start(&self, index: usize) -> usize {

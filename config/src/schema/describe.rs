@@ -41,9 +41,7 @@ fn kindless(keywords: &Keywords) -> bool {
 }
 
 fn array_words(schema: &Schema, all: &[&Keywords]) -> String {
-    let Some(keywords) = all
-        .iter()
-        .find(|keywords| keywords.contains_key("items") || has_prefix(keywords))
+    let Some(keywords) = all.iter().find(|keywords| keywords.contains_key("items") || has_prefix(keywords))
     else {
         return Kind::Array.name().to_owned();
     };
@@ -52,10 +50,7 @@ fn array_words(schema: &Schema, all: &[&Keywords]) -> String {
         let parts: Vec<String> = prefix.iter().map(|item| expected(schema, item)).collect();
         return format!("an array of {}", parts.join(", "));
     }
-    let items = keywords
-        .get("items")
-        .map(|items| expected(schema, items))
-        .unwrap_or_default();
+    let items = keywords.get("items").map(|items| expected(schema, items)).unwrap_or_default();
     let bound = |keyword| keywords.get(keyword).and_then(Value::as_u64);
     match (bound("minItems"), bound("maxItems")) {
         (Some(min), Some(max)) if min == max => format!("an array of {min}, each {items}"),
@@ -87,13 +82,7 @@ fn all_keywords<'s>(schema: &'s Schema, of: &'s Value) -> Vec<&'s Keywords> {
     while let (Some(next), true) = (pending.pop(), all.len() < 200) {
         for keywords in schema.flat(next) {
             all.push(keywords);
-            pending.extend(
-                unions(keywords)
-                    .into_iter()
-                    .filter(|union| union.len() > 1)
-                    .flatten()
-                    .rev(),
-            );
+            pending.extend(unions(keywords).into_iter().filter(|union| union.len() > 1).flatten().rev());
         }
     }
     all
@@ -101,8 +90,5 @@ fn all_keywords<'s>(schema: &'s Schema, of: &'s Value) -> Vec<&'s Keywords> {
 
 /// The docstring that comes first.
 pub(crate) fn description<'s>(schema: &'s Schema, of: &'s Value) -> Option<&'s str> {
-    schema
-        .flat(of)
-        .into_iter()
-        .find_map(|keywords| keywords.get("description").and_then(Value::as_str))
+    schema.flat(of).into_iter().find_map(|keywords| keywords.get("description").and_then(Value::as_str))
 }

@@ -17,15 +17,8 @@ pub(crate) enum Kind {
     Table,
 }
 
-const ALL: [Kind; 7] = [
-    Kind::String,
-    Kind::Integer,
-    Kind::Float,
-    Kind::Boolean,
-    Kind::Datetime,
-    Kind::Array,
-    Kind::Table,
-];
+const ALL: [Kind; 7] =
+    [Kind::String, Kind::Integer, Kind::Float, Kind::Boolean, Kind::Datetime, Kind::Array, Kind::Table];
 
 impl Kind {
     pub(crate) fn of(node: &Node) -> Self {
@@ -70,19 +63,14 @@ impl Kind {
 pub(crate) fn admits(keywords: &Keywords, kind: Kind) -> bool {
     match keywords.get("type") {
         Some(Json::String(name)) => kind.named_by(name),
-        Some(Json::Array(names)) => names
-            .iter()
-            .filter_map(Json::as_str)
-            .any(|name| kind.named_by(name)),
+        Some(Json::Array(names)) => names.iter().filter_map(Json::as_str).any(|name| kind.named_by(name)),
         _ => true,
     }
 }
 
 /// The kinds that a schema admits, looking through references and unions.
 pub(crate) fn kinds(schema: &Schema, of: &Json) -> Vec<Kind> {
-    ALL.into_iter()
-        .filter(|&kind| accepts(schema, of, kind))
-        .collect()
+    ALL.into_iter().filter(|&kind| accepts(schema, of, kind)).collect()
 }
 
 /// Whether a schema admits a kind, looking through references and unions.
@@ -91,9 +79,7 @@ pub(crate) fn accepts(schema: &Schema, of: &Json, kind: Kind) -> bool {
         return false;
     }
     schema.flat(of).into_iter().all(|keywords| {
-        let constant = keywords
-            .get("const")
-            .is_none_or(|value| value.is_string() == (kind == Kind::String));
+        let constant = keywords.get("const").is_none_or(|value| value.is_string() == (kind == Kind::String));
         let listed = array(keywords, "enum");
         let in_list = listed.is_empty() || listed.iter().any(Json::is_string) == (kind == Kind::String);
         let in_unions = unions(keywords)

@@ -32,6 +32,8 @@ pub(crate) struct Schema {
 #[derive(Default)]
 pub(crate) struct Facets<'s> {
     pub all: Vec<&'s Keywords>,
+    /// Variants that exclude each other but are all there: their keys are known, none is required.
+    pub loose: Vec<&'s Keywords>,
     /// Some part of the schema allows anything.
     pub anything: bool,
     /// Unions that could not be decided, and why.
@@ -42,9 +44,7 @@ pub(crate) struct Facets<'s> {
 
 impl Schema {
     pub(crate) fn of<T: JsonSchema>() -> Self {
-        Self {
-            root: schemars::schema_for!(T).to_value(),
-        }
+        Self { root: schemars::schema_for!(T).to_value() }
     }
 
     pub(crate) fn root(&self) -> &Value {
@@ -72,11 +72,7 @@ impl Schema {
             return;
         };
         all.push(keywords);
-        if let Some(target) = keywords
-            .get("$ref")
-            .and_then(Value::as_str)
-            .and_then(|to| self.target(to))
-        {
+        if let Some(target) = keywords.get("$ref").and_then(Value::as_str).and_then(|to| self.target(to)) {
             self.flatten(target, references, all);
         }
         for part in array(keywords, "allOf") {
@@ -111,7 +107,12 @@ impl Schema {
                         facets.passed_over.extend(others);
                         self.gather(schema, node, references, facets);
                     }
-                    undecided => facets.undecided.push(undecided),
+                    undecided => {
+                        if let Pick::Keys { variants, .. } = &undecided {
+                            facets.loose.extend(variants.iter().flat_map(|variant| self.flat(variant)));
+                        }
+                        facets.undecided.push(undecided);
+                    }
                 }
             }
         }
@@ -120,22 +121,14 @@ impl Schema {
 
 /// Elements of an array keyword; none if it is absent.
 pub(crate) fn array<'s>(keywords: &'s Keywords, keyword: &str) -> &'s [Value] {
-    keywords
-        .get(keyword)
-        .and_then(Value::as_array)
-        .map_or(&[], Vec::as_slice)
+    keywords.get(keyword).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
 /// `anyOf` and `oneOf`, each without null.
 pub(crate) fn unions(keywords: &Keywords) -> Vec<Vec<&Value>> {
     ["anyOf", "oneOf"]
         .iter()
-        .map(|keyword| {
-            array(keywords, keyword)
-                .iter()
-                .filter(|variant| !is_null(variant))
-                .collect()
-        })
+        .map(|keyword| array(keywords, keyword).iter().filter(|variant| !is_null(variant)).collect())
         .filter(|union: &Vec<_>| !union.is_empty())
         .collect()
 }
@@ -147,10 +140,7 @@ fn is_null(schema: &Value) -> bool {
 /// Named keys of a table schema.
 pub(crate) fn properties(keywords: &Keywords) -> impl Iterator<Item = (&str, &Value)> {
     let properties = keywords.get("properties").and_then(Value::as_object);
-    properties
-        .into_iter()
-        .flatten()
-        .map(|(key, schema)| (key.as_str(), schema))
+    properties.into_iter().flatten().map(|(key, schema)| (key.as_str(), schema))
 }
 
 /// Names of the keys that must be there.
