@@ -10,6 +10,7 @@
 //! | [`thing`] | things and the [`Scene`] of them |
 //! | [`shape`] | box, sphere, plane, ring, Utah teapot |
 //! | [`import`] | glTF, Wavefront OBJ, Stanford PLY |
+//! | [`normals`], [`tangents`], [`polygon`] | what a file leaves out: made here |
 //! | [`topology`] | whether a surface is closed |
 //! | [`validity`] | what is wrong with a mesh |
 //! | [`sample`] | points spread over surfaces |
@@ -17,17 +18,22 @@
 //! World: right-handed, +Z up, metres. Colours are linear RGB in the see-through camera's own primaries.
 
 pub mod bounds;
+pub mod import;
 pub mod light;
 pub mod material;
 pub mod mesh;
+pub mod normals;
+pub mod polygon;
 pub mod pose;
 pub mod shape;
+pub mod tangents;
 pub mod texture;
 pub mod thing;
 pub mod topology;
 pub mod world;
 
 pub use bounds::{Aabb, Sphere};
+pub use import::{ImportError, Imported, import, import_with};
 pub use light::{Light, LightKind};
 pub use material::{AlphaMode, Material};
 pub use mesh::{Mesh, MeshError, Part};

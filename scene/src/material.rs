@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use glam::{Vec3, Vec4};
+use thiserror::Error;
 
 use crate::texture::Texture;
 
@@ -106,20 +107,12 @@ impl Default for Material {
 impl Material {
     /// A rough dielectric of this albedo.
     pub fn diffuse(albedo: Vec3) -> Self {
-        Self {
-            base_color: albedo.extend(1.0),
-            ..Self::default()
-        }
+        Self { base_color: albedo.extend(1.0), ..Self::default() }
     }
 
     /// A metal of this normal-incidence reflectance (see [`fresnel_f0`] for η and k) and perceptual roughness.
     pub fn metal(f0: Vec3, roughness: f32) -> Self {
-        Self {
-            base_color: f0.extend(1.0),
-            metallic: 1.0,
-            roughness,
-            ..Self::default()
-        }
+        Self { base_color: f0.extend(1.0), metallic: 1.0, roughness, ..Self::default() }
     }
 
     /// A smooth clear dielectric body. Refracts as a solid: its mesh must be closed.
@@ -155,14 +148,56 @@ impl Material {
         if self.attenuation_distance_m.is_infinite() {
             return Vec3::ZERO;
         }
-        self.attenuation_color
-            .map(|part| -part.ln() / self.attenuation_distance_m)
+        self.attenuation_color.map(|part| -part.ln() / self.attenuation_distance_m)
     }
 
     /// Beer–Lambert: share of light left after `distance_m` inside (KHR_materials_volume), `exp(−α′ d)`.
     pub fn transmittance(&self, distance_m: f32) -> Vec3 {
         let exponent = distance_m / self.attenuation_distance_m;
         self.attenuation_color.map(|part| part.powf(exponent))
+    }
+
+    /// Whether all numbers are what they may be; textures are not looked at.
+    ///
+    /// # Errors
+    /// [`MaterialError`] names the first that is not.
+    pub fn check(&self) -> Result<(), MaterialError> {
+        let cutoff = if let AlphaMode::Mask { cutoff } = self.alpha_mode { cutoff } else { 0.5 };
+        let [red, green, blue, alpha] = self.base_color.to_array();
+        let unit = |value: f32| (0.0..=1.0).contains(&value);
+        let positive = |value: f32| value >= 0.0 && value.is_finite();
+        let index = |value: f32| value == 0.0 || (value >= 1.0 && value.is_finite());
+        let [attenuation_r, attenuation_g, attenuation_b] = self.attenuation_color.to_array();
+        let normal_scale = self.normal_map.as_ref().map_or(1.0, |map| map.scale);
+        type Rule<'a> = (&'static str, &'a [f32], &'a dyn Fn(f32) -> bool, &'static str);
+        let rules: [Rule<'_>; 11] = [
+            ("base_color", &[red, green, blue, alpha], &unit, "0 to 1"),
+            ("metallic", &[self.metallic], &unit, "0 to 1"),
+            ("roughness", &[self.roughness], &unit, "0 to 1"),
+            ("emissive", &self.emissive.to_array(), &positive, "0 or more"),
+            ("emissive_strength", &[self.emissive_strength], &positive, "0 or more"),
+            ("transmission", &[self.transmission], &unit, "0 to 1"),
+            ("ior", &[self.ior], &index, "1 or more, or the special value 0"),
+            ("thickness_m", &[self.thickness_m], &positive, "0 or more"),
+            ("attenuation_color", &[attenuation_r, attenuation_g, attenuation_b], &unit, "0 to 1"),
+            ("attenuation_distance_m", &[self.attenuation_distance_m], &|value| value > 0.0, "more than 0"),
+            ("alpha cutoff", &[cutoff], &positive, "0 or more"),
+        ];
+        for (field, values, allowed, expected) in rules {
+            if let Some(&value) = values.iter().find(|&&value| !allowed(value)) {
+                return Err(MaterialError { material: self.name.clone(), field, value, expected });
+            }
+        }
+        if !normal_scale.is_finite() {
+            let (field, value) = ("normal_map.scale", normal_scale);
+            return Err(MaterialError {
+                material: self.name.clone(),
+                field,
+                value,
+                expected: "a finite number",
+            });
+        }
+        Ok(())
     }
 
     /// True where light passes into the body and is bent: transmission with a volume.
@@ -186,4 +221,18 @@ pub fn phong_exponent(alpha: f32) -> f32 {
 /// Inverse of [`phong_exponent`]: `α = √(2/(n + 2))`.
 pub fn alpha_from_phong(exponent: f32) -> f32 {
     (2.0 / (exponent + 2.0)).sqrt()
+}
+
+/// A number of a material that makes no sense.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error("material '{material}': {field} = {value}, expected {expected}")]
+pub struct MaterialError {
+    /// Name of the material.
+    pub material: String,
+    /// Which number.
+    pub field: &'static str,
+    /// Its value.
+    pub value: f32,
+    /// What would be right.
+    pub expected: &'static str,
 }

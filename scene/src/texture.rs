@@ -61,11 +61,7 @@ pub struct UvTransform {
 
 impl Default for UvTransform {
     fn default() -> Self {
-        Self {
-            offset: Vec2::ZERO,
-            rotation_rad: 0.0,
-            scale: Vec2::ONE,
-        }
+        Self { offset: Vec2::ZERO, rotation_rad: 0.0, scale: Vec2::ONE }
     }
 }
 
@@ -115,4 +111,10 @@ impl Texture {
             uv_transform: UvTransform::default(),
         }
     }
+}
+
+/// The sRGB curve of IEC 61966-2-1: code value in [0, 1] to linear light. Outside it goes on as the straight and the
+/// power part do.
+pub fn srgb_to_linear(code: f32) -> f32 {
+    if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
 }
