@@ -10,16 +10,26 @@ use super::{fresh, same};
 enum Place {
     /// The document itself: tables get headers.
     Root,
-    /// Below a header, or inline: tables are inline.
-    Below,
+    /// Below a header: tables are inline.
+    Header,
+    /// Between braces.
+    Inline,
 }
 
 /// `old` is the value of the document as it is, `new` the value that it shall have.
 pub(crate) fn merge(document: &mut DocumentMut, old: &InlineTable, new: &InlineTable) {
+    let before = document.clone();
     merge_table(document.as_table_mut(), old, new, Place::Root);
+    keep_detached_comments(before.as_table(), document);
 }
 
 fn merge_table(table: &mut dyn TableLike, old: &InlineTable, new: &InlineTable, place: Place) {
+    // Between braces, the space before the closing one belongs to the last value, whichever that is.
+    let space = if place == Place::Inline {
+        last_value(table).map(|last| take_suffix(last.decor_mut()))
+    } else {
+        None
+    };
     for (key, _) in old {
         if !new.contains_key(key) {
             table.remove(key);
@@ -39,6 +49,13 @@ fn merge_table(table: &mut dyn TableLike, old: &InlineTable, new: &InlineTable, 
         }
     }
     put_in_order(table, new);
+    if let (Some(space), Some(last)) = (space, last_value(table)) {
+        last.decor_mut().set_suffix(space);
+    }
+}
+
+fn last_value(table: &mut dyn TableLike) -> Option<&mut Value> {
+    table.iter_mut().last().and_then(|(_, item)| item.as_value_mut())
 }
 
 /// `[[thing]]` without any thing cannot be written.
@@ -49,7 +66,7 @@ fn is_empty_section(item: Option<&Item>) -> bool {
 fn merge_item(item: &mut Item, old: Option<&Value>, new: &Value, place: Place) {
     match (&mut *item, old, new) {
         (Item::Table(table), Some(Value::InlineTable(old)), Value::InlineTable(new)) => {
-            merge_table(table, old, new, Place::Below);
+            merge_table(table, old, new, Place::Header);
         }
         (Item::ArrayOfTables(tables), Some(Value::Array(old)), Value::Array(new))
             if mergeable(tables, old, new) =>
@@ -60,7 +77,7 @@ fn merge_item(item: &mut Item, old: Option<&Value>, new: &Value, place: Place) {
         (item, _, new) => {
             *item = match place {
                 Place::Root => fresh::section(new),
-                Place::Below => Item::Value(fresh::inline(new)),
+                Place::Header | Place::Inline => Item::Value(fresh::inline(new)),
             }
         }
     }
@@ -69,7 +86,7 @@ fn merge_item(item: &mut Item, old: Option<&Value>, new: &Value, place: Place) {
 fn merge_value(value: &mut Value, old: Option<&Value>, new: &Value) {
     match (&mut *value, old, new) {
         (Value::InlineTable(table), Some(Value::InlineTable(old)), Value::InlineTable(new)) => {
-            merge_table(table, old, new, Place::Below);
+            merge_table(table, old, new, Place::Inline);
         }
         (Value::Array(array), Some(Value::Array(old)), Value::Array(new)) if array.len() == old.len() => {
             merge_array(array, old, new);
@@ -104,15 +121,9 @@ fn insert(table: &mut dyn TableLike, key: &str, old: Option<&Value>, new: &Value
     };
     let item = match place {
         Place::Root => fresh::section(&new),
-        Place::Below => Item::Value(fresh::inline(&new)),
+        Place::Header | Place::Inline => Item::Value(fresh::inline(&new)),
     };
-    // In an inline table the space before the brace belongs to the last value.
-    let last = table.iter_mut().last().and_then(|(_, item)| item.as_value_mut());
-    let space = if place == Place::Below { last.map(|last| take_suffix(last.decor_mut())) } else { None };
     table.insert(key, item);
-    if let (Some(space), Some(value)) = (space, table.get_mut(key).and_then(Item::as_value_mut)) {
-        value.decor_mut().set_suffix(space);
-    }
 }
 
 /// Takes the space behind a value away, unless it contains a comment.
@@ -189,49 +200,70 @@ fn origins(old: &Array, new: &Array) -> Vec<Option<usize>> {
     align(&old.iter().collect::<Vec<_>>(), &new.iter().collect::<Vec<_>>())
 }
 
+/// New elements look like their neighbours; a comment behind an element, which the parser counts to the next one, stays
+/// with it.
 fn rebuild_array(array: &mut Array, old: &Array, new: &Array, origins: &[Option<usize>]) {
-    let written: Vec<Value> = array.iter().cloned().collect();
     let last_space = array.iter_mut().last().map(|last| take_suffix(last.decor_mut())).unwrap_or_default();
-    let first_indent = written.first().map(indent).unwrap_or_default();
-    let next_indent = written.get(1).map_or_else(
-        || if first_indent.contains('\n') { first_indent.clone() } else { " ".to_owned() },
-        indent,
-    );
-    let last = new.len().saturating_sub(1);
+    let written: Vec<Value> = array.iter().cloned().collect();
+    let trailing = array.trailing().as_str().unwrap_or_default().to_owned();
+    let mut comments: Vec<&str> = written.iter().skip(1).map(|next| split_comment(prefix(next)).0).collect();
+    comments.push(split_comment(&trailing).0);
+    let comment_of =
+        |origin: &Option<usize>| origin.and_then(|from| comments.get(from)).copied().unwrap_or_default();
+
     let mut rebuilt = Vec::with_capacity(new.len());
-    for (at, (value, origin)) in new.iter().zip(origins).enumerate() {
-        let indent = if at == 0 { &first_indent } else { &next_indent };
-        let known = origin.and_then(|from| Some((written.get(from)?.clone(), old.get(from)?)));
-        let mut element = match known {
-            Some((mut element, before)) => {
-                if !same(before, value) {
-                    merge_value(&mut element, Some(before), value);
-                }
-                element
-            }
-            None => fresh::inline(value),
-        };
-        let prefix = element.decor().prefix().and_then(|prefix| prefix.as_str()).unwrap_or_default();
-        if prefix.trim().is_empty() {
-            element.decor_mut().set_prefix(indent.clone());
+    let mut comment_before = "";
+    for (value, origin) in new.iter().zip(origins) {
+        let known = origin.and_then(|from| Some((written.get(from)?, old.get(from)?)));
+        let mut element = known.map_or_else(|| fresh::inline(value), |(element, _)| element.clone());
+        if let Some((_, before)) = known
+            && !same(before, value)
+        {
+            merge_value(&mut element, Some(before), value);
         }
+        let model = known.map(|(element, _)| element).filter(|_| *origin != Some(0) || rebuilt.is_empty());
+        let own = model.map_or_else(
+            || indent(&written, rebuilt.len()),
+            |model| split_comment(prefix(model)).1.to_owned(),
+        );
+        element.decor_mut().set_prefix(format!("{comment_before}{own}"));
         take_suffix(element.decor_mut());
-        if at == last && !last_space.is_empty() {
-            element.decor_mut().set_suffix(last_space.clone());
-        }
+        comment_before = comment_of(origin);
         rebuilt.push(element);
+    }
+    if let Some(last) = rebuilt.last_mut()
+        && !last_space.is_empty()
+    {
+        last.decor_mut().set_suffix(last_space);
     }
     array.clear();
     rebuilt.into_iter().for_each(|element| array.push_formatted(element));
+    array.set_trailing(format!("{comment_before}{}", split_comment(&trailing).1));
 }
 
-/// The white space before an element, without comments.
-fn indent(element: &Value) -> String {
-    let prefix = element.decor().prefix().and_then(|prefix| prefix.as_str()).unwrap_or_default();
-    match prefix.rsplit_once('\n') {
+/// White space before the element at `at`, as the written ones have it.
+fn indent(written: &[Value], at: usize) -> String {
+    let space = |element: &Value| match prefix(element).rsplit_once('\n') {
         Some((_, spaces)) => format!("\n{spaces}"),
-        None => prefix.to_owned(),
+        None => prefix(element).to_owned(),
+    };
+    let first = written.first().map(space).unwrap_or_default();
+    match written.get(1).map(space) {
+        _ if at == 0 || first.contains('\n') => first,
+        Some(second) => second,
+        None => " ".to_owned(),
     }
+}
+
+fn prefix(element: &Value) -> &str {
+    element.decor().prefix().and_then(|prefix| prefix.as_str()).unwrap_or_default()
+}
+
+/// A comment behind the element before, and the rest.
+fn split_comment(prefix: &str) -> (&str, &str) {
+    let end = prefix.find('\n').unwrap_or(prefix.len());
+    let (line, rest) = prefix.split_at(end);
+    if line.contains('#') { (line, rest) } else { ("", prefix) }
 }
 
 fn mergeable(tables: &ArrayOfTables, old: &Array, new: &Array) -> bool {
@@ -253,7 +285,7 @@ fn merge_tables(tables: &mut ArrayOfTables, old: &Array, new: &Array) {
             origin.and_then(|from| Some((written.get(from)?.clone(), old.get(from)?.as_inline_table()?)));
         let mut table = match known {
             Some((mut table, before)) => {
-                merge_table(&mut table, before, value, Place::Below);
+                merge_table(&mut table, before, value, Place::Header);
                 table
             }
             None => fresh::table_with_header(value),
@@ -280,4 +312,58 @@ fn forget_positions(table: &mut Table) {
             _ => {}
         }
     }
+}
+
+/// A comment above a header that an empty line sets apart from it does not belong to the header. If the header went
+/// away, such a comment moves to the next one, or to the end.
+fn keep_detached_comments(before: &Table, document: &mut DocumentMut) {
+    let kept = headers(document.as_table());
+    let mut orphans = headers(before);
+    orphans.retain(|(position, _)| !kept.iter().any(|(known, _)| known == position));
+    for (position, comment) in orphans.into_iter().rev().filter(|(_, comment)| comment.contains('#')) {
+        let next = kept.iter().map(|&(known, _)| known).filter(|&known| known > position).min();
+        let done = next.is_some_and(|next| prepend(document.as_table_mut(), next, &comment));
+        if !done {
+            let end = document.trailing().as_str().unwrap_or_default();
+            let end = format!("{comment}{end}");
+            document.set_trailing(end);
+        }
+    }
+}
+
+/// Positions of all headers and the detached comments above them.
+fn headers(table: &Table) -> Vec<(isize, String)> {
+    let mut all = Vec::new();
+    for (_, item) in table {
+        let below: Vec<&Table> = match item {
+            Item::Table(below) => vec![below],
+            Item::ArrayOfTables(below) => below.iter().collect(),
+            _ => Vec::new(),
+        };
+        for below in below {
+            let prefix = below.decor().prefix().and_then(|prefix| prefix.as_str()).unwrap_or_default();
+            let detached = prefix.rfind("\n\n").map_or("", |at| prefix.get(..=at).unwrap_or_default());
+            all.extend(below.position().map(|position| (position, detached.to_owned())));
+            all.extend(headers(below));
+        }
+    }
+    all
+}
+
+fn prepend(table: &mut Table, position: isize, comment: &str) -> bool {
+    table.iter_mut().any(|(_, item)| match item {
+        Item::Table(below) => prepend_here(below, position, comment),
+        Item::ArrayOfTables(below) => below.iter_mut().any(|below| prepend_here(below, position, comment)),
+        _ => false,
+    })
+}
+
+fn prepend_here(table: &mut Table, position: isize, comment: &str) -> bool {
+    if table.position() != Some(position) {
+        return prepend(table, position, comment);
+    }
+    let prefix = table.decor().prefix().and_then(|prefix| prefix.as_str()).unwrap_or_default();
+    let prefix = format!("{comment}{prefix}");
+    table.decor_mut().set_prefix(prefix);
+    true
 }
