@@ -17,20 +17,12 @@ impl Aabb {
     /// Around points, leaving out those that are not finite; `None` if none is left.
     pub fn around(points: impl IntoIterator<Item = Vec3>) -> Option<Self> {
         let finite = points.into_iter().filter(|point| point.is_finite());
-        finite
-            .map(|point| Self {
-                min: point,
-                max: point,
-            })
-            .reduce(Self::union)
+        finite.map(|point| Self { min: point, max: point }).reduce(Self::union)
     }
 
     /// Around both.
     pub fn union(self, other: Self) -> Self {
-        Self {
-            min: self.min.min(other.min),
-            max: self.max.max(other.max),
-        }
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
     /// Middle.
@@ -48,25 +40,12 @@ impl Aabb {
         let corner = |i: u32| {
             let pick = |bit: u32, low: f32, high: f32| if i >> bit & 1 == 0 { low } else { high };
             let (min, max) = (self.min, self.max);
-            Vec3::new(
-                pick(0, min.x, max.x),
-                pick(1, min.y, max.y),
-                pick(2, min.z, max.z),
-            )
+            Vec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z))
         };
         let first = a_from_b.transform_point(corner(0));
-        (1..8).map(|i| a_from_b.transform_point(corner(i))).fold(
-            Self {
-                min: first,
-                max: first,
-            },
-            |aabb, point| {
-                aabb.union(Self {
-                    min: point,
-                    max: point,
-                })
-            },
-        )
+        (1..8)
+            .map(|i| a_from_b.transform_point(corner(i)))
+            .fold(Self { min: first, max: first }, |aabb, point| aabb.union(Self { min: point, max: point }))
     }
 }
 
@@ -90,10 +69,7 @@ impl Sphere {
         let first = finite().next()?;
         let one = farthest(first)?;
         let other = farthest(one)?;
-        let start = Self {
-            center: one.midpoint(other),
-            radius: one.distance(other) / 2.0,
-        };
+        let start = Self { center: one.midpoint(other), radius: one.distance(other) / 2.0 };
         Some(finite().fold(start, Self::grown_to).with_margin())
     }
 
@@ -103,26 +79,17 @@ impl Sphere {
             return self;
         }
         let radius = (self.radius + distance) / 2.0;
-        Self {
-            center: self.center + (point - self.center) * ((radius - self.radius) / distance),
-            radius,
-        }
+        Self { center: self.center + (point - self.center) * ((radius - self.radius) / distance), radius }
     }
 
     /// Rounding must not leave a point outside.
     fn with_margin(self) -> Self {
         let ulps = 8.0 * f32::EPSILON * (self.radius + self.center.abs().max_element());
-        Self {
-            radius: self.radius + ulps,
-            ..self
-        }
+        Self { radius: self.radius + ulps, ..self }
     }
 
     /// After a transform.
     pub fn transformed(&self, a_from_b: &Similarity) -> Self {
-        Self {
-            center: a_from_b.transform_point(self.center),
-            radius: self.radius * a_from_b.scale,
-        }
+        Self { center: a_from_b.transform_point(self.center), radius: self.radius * a_from_b.scale }
     }
 }

@@ -25,11 +25,13 @@ pub mod mesh;
 pub mod normals;
 pub mod polygon;
 pub mod pose;
+pub mod sample;
 pub mod shape;
 pub mod tangents;
 pub mod texture;
 pub mod thing;
 pub mod topology;
+pub mod validity;
 pub mod world;
 
 pub use bounds::{Aabb, Sphere};
