@@ -29,6 +29,7 @@ mod document;
 mod error;
 mod key_path;
 mod limits;
+mod page;
 mod problem;
 mod schema;
 mod source;
@@ -45,6 +46,7 @@ pub use document::Document;
 pub use error::Error;
 pub use key_path::{KeyPath, Step};
 pub use limits::MAX_FILE_BYTES;
+pub use page::reference_page;
 pub use problem::{Problem, Problems, Severity};
 
 /// Reads a file; see [`Document::read`].

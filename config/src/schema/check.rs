@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::describe::{description, expected};
 use super::kind::{Kind, admits};
 use super::variant::Pick;
-use super::{Facets, Keywords, Schema, allowed_strings, array, number, properties, required};
+use super::{Facets, Keywords, Schema, allowed_strings, array, map_values, number, properties, required};
 use crate::key_path::KeyPath;
 use crate::problem::{MAX_PROBLEMS, Problem};
 use crate::source::{Source, printable};
@@ -317,16 +317,6 @@ fn schemas_of<'s>(facets: &Facets<'s>, key: &str) -> impl Iterator<Item = &'s Va
         None
     };
     named.into_iter().chain(any_key)
-}
-
-/// The schema of the values of a map.
-fn map_values<'s>(keywords: &'s Keywords, key: &str) -> Option<&'s Value> {
-    let patterns = keywords.get("patternProperties").and_then(Value::as_object);
-    let digits = !key.is_empty() && key.trim_start_matches('-').bytes().all(|byte| byte.is_ascii_digit());
-    if let Some(of) = patterns.and_then(|patterns| patterns.values().next()) {
-        return digits.then_some(of);
-    }
-    keywords.get("additionalProperties").filter(|&of| of != &Value::Bool(false))
 }
 
 /// "a string, `"1"`": type and text of what was written.

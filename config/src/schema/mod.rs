@@ -9,7 +9,7 @@ pub(crate) mod check;
 pub(crate) mod describe;
 pub(crate) mod kind;
 mod number;
-mod variant;
+pub(crate) mod variant;
 
 use schemars::JsonSchema;
 use serde_json::{Map, Value};
@@ -155,4 +155,14 @@ pub(crate) fn allowed_strings(keywords: &Keywords) -> Option<Vec<&str>> {
     }
     let values = keywords.get("enum")?.as_array()?;
     Some(values.iter().filter_map(Value::as_str).collect())
+}
+
+/// The schema of the values of a map.
+pub(crate) fn map_values<'s>(keywords: &'s Keywords, key: &str) -> Option<&'s Value> {
+    let patterns = keywords.get("patternProperties").and_then(Value::as_object);
+    let digits = !key.is_empty() && key.trim_start_matches('-').bytes().all(|byte| byte.is_ascii_digit());
+    if let Some(of) = patterns.and_then(|patterns| patterns.values().next()) {
+        return digits.then_some(of);
+    }
+    keywords.get("additionalProperties").filter(|&of| of != &Value::Bool(false))
 }
