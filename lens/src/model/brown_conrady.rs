@@ -39,10 +39,7 @@ impl BrownConrady5 {
         let [k1, k2, p1, p2, k3] = coefficients;
         let distortion = RadialTangential::new([k1, k2, k3], [0.0; 3], [p1, p2]);
         check::field_of_view(model, distortion.max_angle_rad())?;
-        Ok(Self {
-            intrinsics,
-            distortion,
-        })
+        Ok(Self { intrinsics, distortion })
     }
 
     /// k1, k2, p1, p2, k3.
@@ -69,15 +66,9 @@ impl Projection for BrownConrady5 {
         let divided = divide(point)?;
         let (plane, d_plane_d_divided, by_all_eight) = self.distortion.distort_jacobian(&divided)?;
         let mut d_plane_d_params = ParamJacobian::<2>::zeros();
-        d_plane_d_params
-            .fixed_columns_mut::<5>(0)
-            .copy_from(&by_all_eight.fixed_columns::<5>(0));
+        d_plane_d_params.fixed_columns_mut::<5>(0).copy_from(&by_all_eight.fixed_columns::<5>(0));
         let d_plane_d_point = d_plane_d_divided * divide_jacobian(&divided, point.z);
-        Some(PlaneJacobian {
-            plane,
-            d_plane_d_point,
-            d_plane_d_params,
-        })
+        Some(PlaneJacobian { plane, d_plane_d_point, d_plane_d_params })
     }
 
     fn ray_from_plane(&self, plane: &Vector2<f64>) -> Option<Vector3<f64>> {

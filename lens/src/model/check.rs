@@ -13,16 +13,7 @@ pub fn require(
     value: f64,
     allowed: &'static str,
 ) -> Result<(), ModelError> {
-    if ok {
-        Ok(())
-    } else {
-        Err(ModelError::OutOfRange {
-            model,
-            param,
-            value,
-            allowed,
-        })
-    }
+    if ok { Ok(()) } else { Err(ModelError::OutOfRange { model, param, value, allowed }) }
 }
 
 /// Any finite number.
@@ -32,21 +23,13 @@ pub fn finite(model: ModelKind, param: &'static str, value: f64) -> Result<(), M
 
 /// A finite number above zero.
 pub fn positive(model: ModelKind, param: &'static str, value: f64) -> Result<(), ModelError> {
-    require(
-        value.is_finite() && value > 0.0,
-        model,
-        param,
-        value,
-        "a finite number above 0",
-    )
+    require(value.is_finite() && value > 0.0, model, param, value, "a finite number above 0")
 }
 
 /// All distortion coefficients of `model` (its parameters after the four intrinsics) are finite.
 pub fn finite_coefficients(model: ModelKind, coefficients: &[f64]) -> Result<(), ModelError> {
     let names = model.param_names().iter().skip(4);
-    names
-        .zip(coefficients)
-        .try_for_each(|(name, &value)| finite(model, name, value))
+    names.zip(coefficients).try_for_each(|(name, &value)| finite(model, name, value))
 }
 
 /// The cone is wide enough to be a camera's.

@@ -44,24 +44,12 @@ impl DoubleSphere {
         let model = ModelKind::DoubleSphere;
         intrinsics.check(model)?;
         check::require(xi > -1.0 && xi < 1.0, model, "xi", xi, "above -1 and below 1")?;
-        check::require(
-            (0.0..=1.0).contains(&alpha),
-            model,
-            "alpha",
-            alpha,
-            "between 0 and 1",
-        )?;
+        check::require((0.0..=1.0).contains(&alpha), model, "alpha", alpha, "between 0 and 1")?;
         let alpha = alpha.abs(); // −0 would divide to the wrong infinity
         let min_cos = second_sphere::min_cos(alpha);
         let max_angle_rad = max_angle_rad(xi, min_cos);
         check::field_of_view(model, max_angle_rad)?;
-        Ok(Self {
-            intrinsics,
-            xi,
-            alpha,
-            min_cos,
-            max_angle_rad,
-        })
+        Ok(Self { intrinsics, xi, alpha, min_cos, max_angle_rad })
     }
 
     /// ξ, the distance between the two spheres' centres.
@@ -78,11 +66,7 @@ impl DoubleSphere {
         let zeta = direction.z + self.xi;
         let d2 = (direction.xy().norm_squared() + zeta * zeta).sqrt();
         let denominator = self.alpha * d2 + (1.0 - self.alpha) * zeta;
-        (zeta > self.min_cos * d2).then_some(Second {
-            zeta,
-            d2,
-            denominator,
-        })
+        (zeta > self.min_cos * d2).then_some(Second { zeta, d2, denominator })
     }
 }
 
@@ -109,11 +93,7 @@ impl Projection for DoubleSphere {
 
     fn plane_jacobian(&self, point: &Vector3<f64>) -> Option<PlaneJacobian> {
         let (direction, distance) = unit(point)?;
-        let Second {
-            zeta,
-            d2,
-            denominator,
-        } = self.second(&direction)?;
+        let Second { zeta, d2, denominator } = self.second(&direction)?;
         let plane = direction.xy() / denominator;
         // With d1 = |point| = 1: ∂d1 = direction, ζ = ξ d1 + Z, d2² = X² + Y² + ζ².
         let d_zeta = direction * self.xi + Vector3::z();
@@ -123,16 +103,9 @@ impl Projection for DoubleSphere {
         let d_plane_d_point =
             Matrix2x3::identity() / denominator + by_denominator * d_denominator.transpose();
         let mut d_plane_d_params = ParamJacobian::zeros();
-        d_plane_d_params.set_column(
-            0,
-            &(by_denominator * (self.alpha * zeta / d2 + (1.0 - self.alpha))),
-        );
+        d_plane_d_params.set_column(0, &(by_denominator * (self.alpha * zeta / d2 + (1.0 - self.alpha))));
         d_plane_d_params.set_column(1, &(by_denominator * (d2 - zeta)));
-        Some(PlaneJacobian {
-            plane,
-            d_plane_d_point: d_plane_d_point / distance,
-            d_plane_d_params,
-        })
+        Some(PlaneJacobian { plane, d_plane_d_point: d_plane_d_point / distance, d_plane_d_params })
     }
 
     fn ray_from_plane(&self, plane: &Vector2<f64>) -> Option<Vector3<f64>> {

@@ -34,25 +34,13 @@ impl Eucm {
     pub fn new(intrinsics: Intrinsics, alpha: f64, beta: f64) -> Result<Self, ModelError> {
         let model = ModelKind::Eucm;
         intrinsics.check(model)?;
-        check::require(
-            (0.0..=1.0).contains(&alpha),
-            model,
-            "alpha",
-            alpha,
-            "between 0 and 1",
-        )?;
+        check::require((0.0..=1.0).contains(&alpha), model, "alpha", alpha, "between 0 and 1")?;
         check::positive(model, "beta", beta)?;
         let alpha = alpha.abs(); // −0 would divide to the wrong infinity
         let min_cos = second_sphere::min_cos(alpha);
         let max_angle_rad = ((1.0 - min_cos * min_cos) / beta).sqrt().atan2(min_cos);
         check::field_of_view(model, max_angle_rad)?;
-        Ok(Self {
-            intrinsics,
-            alpha,
-            beta,
-            min_cos,
-            max_angle_rad,
-        })
+        Ok(Self { intrinsics, alpha, beta, min_cos, max_angle_rad })
     }
 
     /// α, the mix of parallel and central projection.
@@ -101,11 +89,7 @@ impl Projection for Eucm {
         let d_beta = 0.5 * self.alpha * direction.xy().norm_squared() / d;
         d_plane_d_params.set_column(0, &(by_denominator * (d - direction.z)));
         d_plane_d_params.set_column(1, &(by_denominator * d_beta));
-        Some(PlaneJacobian {
-            plane,
-            d_plane_d_point: d_plane_d_point / distance,
-            d_plane_d_params,
-        })
+        Some(PlaneJacobian { plane, d_plane_d_point: d_plane_d_point / distance, d_plane_d_params })
     }
 
     fn ray_from_plane(&self, plane: &Vector2<f64>) -> Option<Vector3<f64>> {

@@ -43,12 +43,7 @@ impl Intrinsics {
     /// `cx' = s(cx + ½) − ½`. The distortion parameters of all models stay as they are.
     pub fn scaled(&self, scale: Vector2<f64>) -> Self {
         let center_px = CameraPx::new(self.cx, self.cy).scaled(scale).0;
-        Self {
-            fx: self.fx * scale.x,
-            fy: self.fy * scale.y,
-            cx: center_px.x,
-            cy: center_px.y,
-        }
+        Self { fx: self.fx * scale.x, fy: self.fy * scale.y, cx: center_px.x, cy: center_px.y }
     }
 
     /// The camera matrix K (3×3, OpenCV's convention, no skew).

@@ -41,12 +41,7 @@ impl KannalaBrandt4 {
         check::finite_coefficients(model, &coefficients)?;
         let max_angle_rad = max_angle_rad(&coefficients);
         check::field_of_view(model, max_angle_rad)?;
-        let mut this = Self {
-            intrinsics,
-            k: coefficients,
-            max_angle_rad,
-            max_image_radius: 0.0,
-        };
+        let mut this = Self { intrinsics, k: coefficients, max_angle_rad, max_image_radius: 0.0 };
         this.max_image_radius = this.image_radius(max_angle_rad).0;
         Ok(this)
     }

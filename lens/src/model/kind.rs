@@ -54,9 +54,7 @@ impl ModelKind {
         match self {
             Self::Pinhole => &["fx", "fy", "cx", "cy"],
             Self::BrownConrady5 => &["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"],
-            Self::Rational8 => &[
-                "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6",
-            ],
+            Self::Rational8 => &["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"],
             Self::KannalaBrandt4 => &["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"],
             Self::DoubleSphere => &["fx", "fy", "cx", "cy", "xi", "alpha"],
             Self::Eucm => &["fx", "fy", "cx", "cy", "alpha", "beta"],

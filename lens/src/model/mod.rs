@@ -88,14 +88,7 @@ macro_rules! from_model {
         }
     )* };
 }
-from_model!(
-    Pinhole,
-    BrownConrady5,
-    Rational8,
-    KannalaBrandt4,
-    DoubleSphere,
-    Eucm
-);
+from_model!(Pinhole, BrownConrady5, Rational8, KannalaBrandt4, DoubleSphere, Eucm);
 
 /// Calls the same method of whichever model it is.
 macro_rules! dispatch {
@@ -119,64 +112,23 @@ impl CameraModel {
     pub fn from_params(kind: ModelKind, params: &[f64]) -> Result<Self, ModelError> {
         let keys = match (kind, params) {
             (ModelKind::Pinhole, &[fx, fy, cx, cy]) => ModelKeys::Pinhole { fx, fy, cx, cy },
-            (ModelKind::BrownConrady5, &[fx, fy, cx, cy, k1, k2, p1, p2, k3]) => ModelKeys::BrownConrady5 {
-                fx,
-                fy,
-                cx,
-                cy,
-                k1,
-                k2,
-                p1,
-                p2,
-                k3,
-            },
-            (ModelKind::Rational8, &[fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6]) => {
-                ModelKeys::Rational8 {
-                    fx,
-                    fy,
-                    cx,
-                    cy,
-                    k1,
-                    k2,
-                    p1,
-                    p2,
-                    k3,
-                    k4,
-                    k5,
-                    k6,
-                }
+            (ModelKind::BrownConrady5, &[fx, fy, cx, cy, k1, k2, p1, p2, k3]) => {
+                ModelKeys::BrownConrady5 { fx, fy, cx, cy, k1, k2, p1, p2, k3 }
             }
-            (ModelKind::KannalaBrandt4, &[fx, fy, cx, cy, k1, k2, k3, k4]) => ModelKeys::KannalaBrandt4 {
-                fx,
-                fy,
-                cx,
-                cy,
-                k1,
-                k2,
-                k3,
-                k4,
-            },
-            (ModelKind::DoubleSphere, &[fx, fy, cx, cy, xi, alpha]) => ModelKeys::DoubleSphere {
-                fx,
-                fy,
-                cx,
-                cy,
-                xi,
-                alpha,
-            },
-            (ModelKind::Eucm, &[fx, fy, cx, cy, alpha, beta]) => ModelKeys::Eucm {
-                fx,
-                fy,
-                cx,
-                cy,
-                alpha,
-                beta,
-            },
+            (ModelKind::Rational8, &[fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6]) => {
+                ModelKeys::Rational8 { fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6 }
+            }
+            (ModelKind::KannalaBrandt4, &[fx, fy, cx, cy, k1, k2, k3, k4]) => {
+                ModelKeys::KannalaBrandt4 { fx, fy, cx, cy, k1, k2, k3, k4 }
+            }
+            (ModelKind::DoubleSphere, &[fx, fy, cx, cy, xi, alpha]) => {
+                ModelKeys::DoubleSphere { fx, fy, cx, cy, xi, alpha }
+            }
+            (ModelKind::Eucm, &[fx, fy, cx, cy, alpha, beta]) => {
+                ModelKeys::Eucm { fx, fy, cx, cy, alpha, beta }
+            }
             _ => {
-                return Err(ModelError::ParamCount {
-                    model: kind,
-                    got: params.len(),
-                });
+                return Err(ModelError::ParamCount { model: kind, got: params.len() });
             }
         };
         keys.try_into()

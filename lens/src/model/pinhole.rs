@@ -56,11 +56,7 @@ impl Projection for Pinhole {
     fn plane_jacobian(&self, point: &Vector3<f64>) -> Option<PlaneJacobian> {
         let plane = divide(point)?;
         let d_plane_d_point = divide_jacobian(&plane, point.z);
-        Some(PlaneJacobian {
-            plane,
-            d_plane_d_point,
-            d_plane_d_params: ParamJacobian::zeros(),
-        })
+        Some(PlaneJacobian { plane, d_plane_d_point, d_plane_d_params: ParamJacobian::zeros() })
     }
 
     fn ray_from_plane(&self, plane: &Vector2<f64>) -> Option<Vector3<f64>> {

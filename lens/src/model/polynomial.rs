@@ -26,9 +26,7 @@ pub fn product(a: &[f64], b: &[f64]) -> Polynomial {
 /// `a + factor · b`.
 pub fn sum(a: &[f64], factor: f64, b: &[f64]) -> Polynomial {
     let at = |p: &[f64], i: usize| p.get(i).copied().unwrap_or(0.0);
-    (0..a.len().max(b.len()))
-        .map(|i| at(a, i) + factor * at(b, i))
-        .collect()
+    (0..a.len().max(b.len())).map(|i| at(a, i) + factor * at(b, i)).collect()
 }
 
 /// `2 s p'(s)`, which is `r d/dr p(r²)` written in s = r².

@@ -5,8 +5,8 @@ use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, SMatrix, Vector2, Vector3};
 use super::{Intrinsics, MAX_PARAMS};
 
 /// How closely the forward projection must reproduce a point of the plane of unit focal length before its ray counts
-/// as found, relative to 1 + its magnitude. Ill-conditioned but valid points reach 10⁻¹² (see `MIN_SLOPE`).
-const REPRODUCED: f64 = 1e-11;
+/// as found, relative to 1 + its magnitude. Ill-conditioned but valid points reach some 10⁻¹¹ (see `MIN_SLOPE`).
+const REPRODUCED: f64 = 1e-10;
 
 /// Derivatives of two or three outputs by the parameters: column i belongs to `param_names()[i]`, the columns after
 /// the model's last parameter are zero.
@@ -99,30 +99,20 @@ pub trait Projection {
             return None;
         }
         let intrinsics = self.intrinsics();
-        let PlaneJacobian {
-            plane,
-            d_plane_d_point,
-            d_plane_d_params,
-        } = self.plane_jacobian(point)?;
+        let PlaneJacobian { plane, d_plane_d_point, d_plane_d_params } = self.plane_jacobian(point)?;
         let focal = Matrix2::new(intrinsics.fx, 0.0, 0.0, intrinsics.fy);
         let mut d_px_d_params = ParamJacobian::<2>::zeros();
         d_px_d_params.fixed_view_mut::<2, 4>(0, 0).copy_from_slice(&[
             plane.x, 0.0, 0.0, plane.y, 1.0, 0.0, 0.0, 1.0, // by fx, fy, cx, cy, column by column
         ]);
         let own = focal * d_plane_d_params.fixed_columns::<{ MAX_PARAMS - 4 }>(0);
-        d_px_d_params
-            .fixed_columns_mut::<{ MAX_PARAMS - 4 }>(4)
-            .copy_from(&own);
+        d_px_d_params.fixed_columns_mut::<{ MAX_PARAMS - 4 }>(4).copy_from(&own);
         let px = intrinsics.px_from_plane(&plane);
         let d_px_d_point = focal * d_plane_d_point;
         let finite = all_finite(px.as_slice())
             && all_finite(d_px_d_point.as_slice())
             && all_finite(d_px_d_params.as_slice());
-        finite.then_some(ProjectJacobian {
-            px,
-            d_px_d_point,
-            d_px_d_params,
-        })
+        finite.then_some(ProjectJacobian { px, d_px_d_point, d_px_d_params })
     }
 
     /// [`unproject`](Self::unproject) with its derivatives by the pixel and by all parameters.
@@ -137,11 +127,7 @@ pub trait Projection {
         let d_ray_d_px = tangents * (forward.d_px_d_point * tangents).try_inverse()?;
         let d_ray_d_params = -d_ray_d_px * forward.d_px_d_params;
         let finite = all_finite(d_ray_d_px.as_slice()) && all_finite(d_ray_d_params.as_slice());
-        finite.then_some(UnprojectJacobian {
-            ray,
-            d_ray_d_px,
-            d_ray_d_params,
-        })
+        finite.then_some(UnprojectJacobian { ray, d_ray_d_px, d_ray_d_params })
     }
 }
 

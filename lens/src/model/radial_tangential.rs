@@ -62,13 +62,7 @@ impl RadialTangential {
     pub fn new(numerator: [f64; 3], denominator: [f64; 3], p: [f64; 2]) -> Self {
         let q = Vector2::new(p[1], p[0]);
         let max_radius = max_radius(&with_one(numerator), &with_one(denominator), q.norm());
-        let mut this = Self {
-            numerator,
-            denominator,
-            q,
-            max_radius,
-            max_image_radius: 0.0,
-        };
+        let mut this = Self { numerator, denominator, q, max_radius, max_image_radius: 0.0 };
         // |s q + 2 (q·x) x| ≤ 3 s |q|
         this.max_image_radius = this.image_radius(max_radius).0 + 3.0 * max_radius * max_radius * q.norm();
         this
@@ -107,21 +101,12 @@ impl RadialTangential {
         if image_radius.is_nan() || image_radius > self.max_image_radius {
             return None;
         }
-        let radius = increasing_root(
-            |r| self.image_radius(r),
-            image_radius,
-            self.max_radius,
-            image_radius,
-        )?;
+        let radius = increasing_root(|r| self.image_radius(r), image_radius, self.max_radius, image_radius)?;
         if radius == 0.0 || image_radius == 0.0 {
             return Some(*image);
         }
         let start = image * (radius / image_radius);
-        if self.q == Vector2::zeros() {
-            Some(start)
-        } else {
-            self.refine(image, start)
-        }
+        if self.q == Vector2::zeros() { Some(start) } else { self.refine(image, start) }
     }
 
     fn is_inside(&self, x: &Vector2<f64>) -> bool {
@@ -136,11 +121,7 @@ impl RadialTangential {
         let dm = k4 + s * (2.0 * k5 + 3.0 * s * k6);
         let inv_denominator = 1.0 / m;
         let g = n * inv_denominator;
-        Radial {
-            g,
-            dg_ds: (dn - g * dm) * inv_denominator,
-            inv_denominator,
-        }
+        Radial { g, dg_ds: (dn - g * dm) * inv_denominator, inv_denominator }
     }
 
     /// h(r) = r g(r²) and its slope.
@@ -250,14 +231,8 @@ fn max_radius(n: &[f64], m: &[f64], q: f64) -> f64 {
 
     let conditions = [
         (poly::of_square(m), poly::of_square(&size_m)),
-        (
-            less_tangential(&slope, m, 6.0 * q),
-            less_tangential(&size_slope, &size_m, -6.0 * q),
-        ),
-        (
-            less_tangential(&nm, m, 10.0 / 3.0 * q),
-            less_tangential(&size_nm, &size_m, -10.0 / 3.0 * q),
-        ),
+        (less_tangential(&slope, m, 6.0 * q), less_tangential(&size_slope, &size_m, -6.0 * q)),
+        (less_tangential(&nm, m, 10.0 / 3.0 * q), less_tangential(&size_nm, &size_m, -10.0 / 3.0 * q)),
     ];
     conditions.iter().fold(MAX_TAN, |limit, (condition, size)| {
         poly::positive_up_to(&poly::sum(condition, -MIN_SLOPE, size), limit)
@@ -267,9 +242,5 @@ fn max_radius(n: &[f64], m: &[f64], q: f64) -> f64 {
 /// `radial(r²) − tangential · r · M(r²)²` as a polynomial in r.
 fn less_tangential(radial: &[f64], m: &[f64], tangential: f64) -> Polynomial {
     let squared = poly::of_square(&poly::product(m, m));
-    poly::sum(
-        &poly::of_square(radial),
-        -tangential,
-        &poly::product(&[0.0, 1.0], &squared),
-    )
+    poly::sum(&poly::of_square(radial), -tangential, &poly::product(&[0.0, 1.0], &squared))
 }

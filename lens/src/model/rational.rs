@@ -39,10 +39,7 @@ impl Rational8 {
         let [k1, k2, p1, p2, k3, k4, k5, k6] = coefficients;
         let distortion = RadialTangential::new([k1, k2, k3], [k4, k5, k6], [p1, p2]);
         check::field_of_view(model, distortion.max_angle_rad())?;
-        Ok(Self {
-            intrinsics,
-            distortion,
-        })
+        Ok(Self { intrinsics, distortion })
     }
 
     /// k1, k2, p1, p2, k3, k4, k5, k6.
@@ -68,11 +65,7 @@ impl Projection for Rational8 {
         let divided = divide(point)?;
         let (plane, d_plane_d_divided, d_plane_d_params) = self.distortion.distort_jacobian(&divided)?;
         let d_plane_d_point = d_plane_d_divided * divide_jacobian(&divided, point.z);
-        Some(PlaneJacobian {
-            plane,
-            d_plane_d_point,
-            d_plane_d_params,
-        })
+        Some(PlaneJacobian { plane, d_plane_d_point, d_plane_d_params })
     }
 
     fn ray_from_plane(&self, plane: &Vector2<f64>) -> Option<Vector3<f64>> {

@@ -30,10 +30,8 @@ fn check_inside(lens: &CameraModel) -> Result<(), TestCaseError> {
                 last = radius;
             }
             if let Some(forward) = lens.project_jacobian(&direction(theta, phi)) {
-                let (out, around) = (
-                    direction(theta + FRAC_PI_2, phi),
-                    direction(FRAC_PI_2, phi + FRAC_PI_2),
-                );
+                let (out, around) =
+                    (direction(theta + FRAC_PI_2, phi), direction(FRAC_PI_2, phi + FRAC_PI_2));
                 let turn = forward.d_px_d_point * Matrix3x2::from_columns(&[out, around]);
                 prop_assert!(turn.determinant() > 0.0, "{lens:?} folds at {theta}, {phi}");
             }
@@ -61,10 +59,7 @@ fn formula(kind: ModelKind, p: &[f64], theta: f64) -> f64 {
                 / (1.0 + k(9) * s + k(10) * s.powi(2) + k(11) * s.powi(3))
         }
         ModelKind::KannalaBrandt4 => {
-            theta
-                + (0..4)
-                    .map(|i| p[4 + i] * theta.powi(3 + 2 * i as i32))
-                    .sum::<f64>()
+            theta + (0..4).map(|i| p[4 + i] * theta.powi(3 + 2 * i as i32)).sum::<f64>()
         }
         ModelKind::DoubleSphere => {
             let zeta = cos + p[4];
@@ -142,18 +137,9 @@ fn closed_forms() {
         CameraModel::from_params(kind, &params).unwrap().max_angle_rad()
     };
     let close = |got: f64, want: f64| assert!(got < want && got > want - 3e-4, "{got} {want}");
-    close(
-        cone(ModelKind::BrownConrady5, &[-0.3, 0.0, 0.0, 0.0, 0.0]),
-        (1.0f64 / 0.9).sqrt().atan(),
-    );
-    close(
-        cone(ModelKind::Rational8, &[0.0, 0.0, 0.0, 0.0, 0.0, -0.5, 0.0, 0.0]),
-        2f64.sqrt().atan(),
-    );
-    close(
-        cone(ModelKind::KannalaBrandt4, &[-0.1, 0.0, 0.0, 0.0]),
-        (1.0f64 / 0.3).sqrt(),
-    );
+    close(cone(ModelKind::BrownConrady5, &[-0.3, 0.0, 0.0, 0.0, 0.0]), (1.0f64 / 0.9).sqrt().atan());
+    close(cone(ModelKind::Rational8, &[0.0, 0.0, 0.0, 0.0, 0.0, -0.5, 0.0, 0.0]), 2f64.sqrt().atan());
+    close(cone(ModelKind::KannalaBrandt4, &[-0.1, 0.0, 0.0, 0.0]), (1.0f64 / 0.3).sqrt());
     close(cone(ModelKind::DoubleSphere, &[0.0, 0.7]), (-3.0f64 / 7.0).acos());
     close(cone(ModelKind::Eucm, &[0.7, 1.0]), (-3.0f64 / 7.0).acos());
     close(cone(ModelKind::Eucm, &[0.3, 1.0]), (-3.0f64 / 7.0).acos());

@@ -16,10 +16,7 @@ fn reads_well_in_toml() {
                 k1 = 0.0025\nk2 = -0.0075\nk3 = 0.001\nk4 = -0.0005\n";
     let file: File = toml::from_str(text).unwrap();
     let expected = [336.25, 336.0, 543.0, 377.5, 0.0025, -0.0075, 0.001, -0.0005];
-    assert_eq!(
-        file.lens,
-        CameraModel::from_params(ModelKind::KannalaBrandt4, &expected).unwrap()
-    );
+    assert_eq!(file.lens, CameraModel::from_params(ModelKind::KannalaBrandt4, &expected).unwrap());
     assert_eq!(toml::to_string(&file).unwrap(), text);
 }
 
@@ -41,23 +38,13 @@ fn every_model_survives_a_file_bit_by_bit() {
 fn wrong_files_are_refused_by_name() {
     let pinhole = "[lens]\nmodel = \"pinhole\"\nfx = 500.0\nfy = 500.0\ncx = 319.5\n";
     let error = |text: &str| toml::from_str::<File>(text).unwrap_err().to_string();
-    assert!(
-        error(pinhole).contains("missing field `cy`"),
-        "{}",
-        error(pinhole)
-    );
+    assert!(error(pinhole).contains("missing field `cy`"), "{}", error(pinhole));
     let unknown = error(&format!("{pinhole}cy = 239.5\nk1 = 0.1\n"));
     assert!(unknown.contains("k1"), "{unknown}");
-    let negative = error(&format!(
-        "{}cy = 1.0\n",
-        pinhole.replace("fx = 500.0", "fx = -500.0")
-    ));
+    let negative = error(&format!("{}cy = 1.0\n", pinhole.replace("fx = 500.0", "fx = -500.0")));
     assert!(negative.contains("fx = -500"), "{negative}");
     let model = error("[lens]\nmodel = \"fisheye\"\n");
-    assert!(
-        model.contains("fisheye") && model.contains("kannala_brandt4"),
-        "{model}"
-    );
+    assert!(model.contains("fisheye") && model.contains("kannala_brandt4"), "{model}");
 }
 
 #[test]
@@ -65,11 +52,7 @@ fn the_schema_lists_all_models_and_keys() {
     let schema = serde_json::to_string(&schemars::schema_for!(CameraModel)).unwrap();
     for kind in ModelKind::ALL {
         assert!(schema.contains(&format!("\"{}\"", kind.name())), "{schema}");
-        assert!(
-            kind.param_names()
-                .iter()
-                .all(|name| schema.contains(&format!("\"{name}\"")))
-        );
+        assert!(kind.param_names().iter().all(|name| schema.contains(&format!("\"{name}\""))));
     }
 }
 
@@ -82,17 +65,9 @@ fn a_resized_image_has_the_same_rays() {
         let scale = Vector2::new(0.25, 3.0);
         let scaled = lens.scaled(scale).unwrap();
         let expected = (lens.project(&point).unwrap() + half).component_mul(&scale) - half;
-        assert!(
-            (scaled.project(&point).unwrap() - expected).norm() < 1e-10,
-            "{lens:?}"
-        );
+        assert!((scaled.project(&point).unwrap() - expected).norm() < 1e-10, "{lens:?}");
         assert_eq!(scaled.max_angle_rad(), lens.max_angle_rad());
-        assert!(
-            lens.scaled(Vector2::new(0.0, 1.0))
-                .unwrap_err()
-                .to_string()
-                .contains("fx")
-        );
+        assert!(lens.scaled(Vector2::new(0.0, 1.0)).unwrap_err().to_string().contains("fx"));
     }
 }
 

@@ -26,25 +26,24 @@ fn check<const N: usize>(
 ) -> Result<(), TestCaseError> {
     let quotient = |h: f64| Some((f(h * scale)? - f(-h * scale)?) / (2.0 * h));
     let (Some(coarse), Some(fine)) = (quotient(STEP), quotient(STEP / 2.0)) else {
-        return Ok(()); // the step leaves the model's parameter range or cone
+        return Err(TestCaseError::fail(format!("{what}: the step leaves the cone")));
     };
     let tolerance = (coarse - fine).norm() + ROUNDINGS * f64::EPSILON * size / STEP;
     let error = (analytic * scale - fine).norm();
-    prop_assert!(
-        error <= tolerance,
-        "{what}: {error} > {tolerance}: {} {fine}",
-        analytic * scale
-    );
-    prop_assert!(
-        tolerance < 1e-4 * (size + fine.norm()),
-        "{what}: loose, {tolerance}"
-    );
+    prop_assert!(error <= tolerance, "{what}: {error} > {tolerance}: {} {fine}", analytic * scale);
+    prop_assert!(tolerance < 1e-4 * (size + fine.norm()), "{what}: loose, {tolerance}");
     Ok(())
 }
 
 /// One unit of each parameter: focal lengths for the intrinsics, 0.01 for coefficients (of powers up to r⁷).
 fn unit_of(lens: &CameraModel, param: usize) -> f64 {
     if param < 4 { lens.intrinsics().fx } else { 0.01 }
+}
+
+/// Whether both ends of the step are lenses: alpha = 0 has no neighbour below.
+fn can_vary(lens: &CameraModel, param: usize) -> bool {
+    let step = STEP * unit_of(lens, param);
+    varied(lens, param, step).is_some() && varied(lens, param, -step).is_some()
 }
 
 fn varied(lens: &CameraModel, param: usize, by: f64) -> Option<CameraModel> {
@@ -61,27 +60,17 @@ fn check_project(lens: &CameraModel, theta: f64, phi: f64) -> Result<(), TestCas
     let size = lens.intrinsics().fx + forward.px.norm();
     for axis in 0..3 {
         let analytic = forward.d_px_d_point.column(axis).into_owned();
-        check(
-            &format!("{lens:?} point[{axis}] at {theta}, {phi}"),
-            analytic,
-            size,
-            distance,
-            |by| {
-                let mut point = point;
-                point[axis] += by;
-                lens.project(&point)
-            },
-        )?;
+        check(&format!("{lens:?} point[{axis}] at {theta}, {phi}"), analytic, size, distance, |by| {
+            let mut point = point;
+            point[axis] += by;
+            lens.project(&point)
+        })?;
     }
-    for (i, name) in lens.param_names().iter().enumerate() {
+    for (i, name) in lens.param_names().iter().enumerate().filter(|(i, _)| can_vary(lens, *i)) {
         let analytic = forward.d_px_d_params.column(i).into_owned();
-        check(
-            &format!("{lens:?} {name} at {theta}, {phi}"),
-            analytic,
-            size,
-            unit_of(lens, i),
-            |by| varied(lens, i, by)?.project(&point),
-        )?;
+        check(&format!("{lens:?} {name} at {theta}, {phi}"), analytic, size, unit_of(lens, i), |by| {
+            varied(lens, i, by)?.project(&point)
+        })?;
     }
     let unused = forward.d_px_d_params.columns_range(lens.params().len()..);
     prop_assert!(unused.iter().all(|d| *d == 0.0));
@@ -106,15 +95,11 @@ fn check_unproject(lens: &CameraModel, theta: f64, phi: f64) -> Result<(), TestC
             },
         )?;
     }
-    for (i, name) in lens.param_names().iter().enumerate() {
+    for (i, name) in lens.param_names().iter().enumerate().filter(|(i, _)| can_vary(lens, *i)) {
         let analytic = back.d_ray_d_params.column(i).into_owned();
-        check(
-            &format!("{lens:?} ray by {name} at {theta}, {phi}"),
-            analytic,
-            1.0,
-            unit_of(lens, i),
-            |by| varied(lens, i, by)?.unproject(&px),
-        )?;
+        check(&format!("{lens:?} ray by {name} at {theta}, {phi}"), analytic, 1.0, unit_of(lens, i), |by| {
+            varied(lens, i, by)?.unproject(&px)
+        })?;
     }
     Ok(())
 }
@@ -161,10 +146,7 @@ fn any_distance() {
             let far = lens.project_jacobian(&(point * scale)).unwrap();
             assert!((far.px - near.px).norm() < 1e-12 * near.px.norm(), "{lens:?}");
             let difference = far.d_px_d_point * scale - near.d_px_d_point;
-            assert!(
-                difference.norm() < 1e-12 * near.d_px_d_point.norm(),
-                "{lens:?} {exponent}"
-            );
+            assert!(difference.norm() < 1e-12 * near.d_px_d_point.norm(), "{lens:?} {exponent}");
         }
     }
 }

@@ -8,12 +8,7 @@ use serde_json::Value;
 use crate::lenses::angle;
 
 fn numbers(value: &Value) -> Vec<f64> {
-    value
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|v| v.as_f64().unwrap())
-        .collect()
+    value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
 }
 
 #[test]
@@ -39,9 +34,7 @@ fn compare_projected(model: &CameraModel, rows: &Value, name: &str) -> f64 {
     rows.iter().fold(0.0, |worst, row| {
         let point = Vector3::from_vec(numbers(&row["point"]));
         let theirs = Vector2::from_vec(numbers(&row["px"]));
-        let ours = model
-            .project(&point)
-            .unwrap_or_else(|| panic!("{name}: {point} not projected"));
+        let ours = model.project(&point).unwrap_or_else(|| panic!("{name}: {point} not projected"));
         let error = (ours - theirs).norm();
         assert!(error <= 1e-9, "{name}: {point} is off by {error} px");
         error.max(worst)
@@ -56,15 +49,10 @@ fn compare_unprojected(model: &CameraModel, rows: &Value, name: &str) -> f64 {
     rows.iter().fold(0.0, |worst, row| {
         let px = Vector2::from_vec(numbers(&row["px"]));
         let theirs = Vector3::from_vec(numbers(&row["ray"]));
-        let ours = model
-            .unproject_jacobian(&px)
-            .unwrap_or_else(|| panic!("{name}: {px} not unprojected"));
+        let ours = model.unproject_jacobian(&px).unwrap_or_else(|| panic!("{name}: {px} not unprojected"));
         let error = angle(&ours.ray, &theirs);
         let allowed = 1e-10 * ours.d_ray_d_px.norm() + 1e-14;
-        assert!(
-            allowed < 1e-9 && error <= allowed,
-            "{name}: {px} is off by {error} rad"
-        );
+        assert!(allowed < 1e-9 && error <= allowed, "{name}: {px} is off by {error} rad");
         error.max(worst)
     })
 }

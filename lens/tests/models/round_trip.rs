@@ -14,10 +14,7 @@ fn fractions() -> Vec<f64> {
     let even = (0..24).map(|i| f64::from(i) / 24.0);
     let near_axis = (1..16).map(|i| 10f64.powi(-i));
     let near_edge = (1..=9).map(|i| 1.0 - 10f64.powi(-i));
-    even.chain(near_axis)
-        .chain(near_edge)
-        .chain([1e-30, 1e-160, 5e-324])
-        .collect()
+    even.chain(near_axis).chain(near_edge).chain([1e-30, 1e-160, 5e-324]).collect()
 }
 
 /// Both round trips of one lens; the largest errors in radians and in px (relative to 1 + |px|).
@@ -27,19 +24,10 @@ fn errors_over_the_cone(lens: &CameraModel) -> Result<(f64, f64), String> {
         for i in 0..9 {
             let phi = TAU * f64::from(i) / 9.0 + 0.01;
             let point = direction(lens.max_angle_rad() * fraction, phi);
-            let at = format!(
-                "{lens:?} at {fraction} of {} rad, phi {phi}",
-                lens.max_angle_rad()
-            );
-            let px = lens
-                .project(&(point * 3.7))
-                .ok_or_else(|| format!("not projected: {at}"))?;
-            let ray = lens
-                .unproject(&px)
-                .ok_or_else(|| format!("not unprojected: {at}"))?;
-            let again = lens
-                .project(&ray)
-                .ok_or_else(|| format!("not projected again: {at}"))?;
+            let at = format!("{lens:?} at {fraction} of {} rad, phi {phi}", lens.max_angle_rad());
+            let px = lens.project(&(point * 3.7)).ok_or_else(|| format!("not projected: {at}"))?;
+            let ray = lens.unproject(&px).ok_or_else(|| format!("not unprojected: {at}"))?;
+            let again = lens.project(&ray).ok_or_else(|| format!("not projected again: {at}"))?;
             let (ray_error, px_error) = (angle(&ray, &point), (again - px).norm() / (1.0 + px.norm()));
             if ray_error.max(px_error).max((ray.norm() - 1.0).abs()) > 1e-9 {
                 return Err(format!("{ray_error} rad, {px_error} px: {at}"));
@@ -54,11 +42,7 @@ fn errors_over_the_cone(lens: &CameraModel) -> Result<(f64, f64), String> {
 fn known_lenses() {
     for lens in lenses::known() {
         let (rad, px) = errors_over_the_cone(&lens).unwrap();
-        println!(
-            "{:15} {:6.2}°: {rad:.1e} rad, {px:.1e} px",
-            lens.kind(),
-            lens.max_angle_rad().to_degrees()
-        );
+        println!("{:15} {:6.2}°: {rad:.1e} rad, {px:.1e} px", lens.kind(), lens.max_angle_rad().to_degrees());
     }
 }
 

@@ -22,10 +22,7 @@ fn wild() -> impl Strategy<Value = f64> {
 /// Half of the lenses have ordinary intrinsics, or hardly any would be accepted.
 fn wild_params() -> impl Strategy<Value = (ModelKind, Vec<f64>)> {
     let kind = proptest::sample::select(ModelKind::ALL.to_vec());
-    let own = prop_oneof![
-        proptest::collection::vec(wild(), 12),
-        proptest::collection::vec(-1.0..1.0f64, 12)
-    ];
+    let own = prop_oneof![proptest::collection::vec(wild(), 12), proptest::collection::vec(-1.0..1.0f64, 12)];
     (kind, own, any::<bool>()).prop_map(|(kind, mut params, tame)| {
         if tame {
             params[..4].copy_from_slice(&[500.0, 510.0, 320.0, 240.0]);
@@ -114,15 +111,9 @@ fn messages_name_the_parameter_and_its_range() {
             message(ModelKind::Eucm, &[1.0, 1.0, 0.0, 0.0, 1.5, 0.5]),
             "alpha = 1.5 is not allowed; it must be between 0 and 1",
         ),
+        (message(ModelKind::Eucm, &[1.0, 1.0, 0.0, 0.0, 0.5, 0.0]), "beta = 0 is not allowed"),
         (
-            message(ModelKind::Eucm, &[1.0, 1.0, 0.0, 0.0, 0.5, 0.0]),
-            "beta = 0 is not allowed",
-        ),
-        (
-            message(
-                ModelKind::KannalaBrandt4,
-                &[1.0, 1.0, 0.0, 0.0, 0.0, f64::INFINITY, 0.0, 0.0],
-            ),
+            message(ModelKind::KannalaBrandt4, &[1.0, 1.0, 0.0, 0.0, 0.0, f64::INFINITY, 0.0, 0.0]),
             "k2 = inf is not allowed",
         ),
         (
@@ -130,10 +121,7 @@ fn messages_name_the_parameter_and_its_range() {
             "has 8 parameters (fx, fy, cx, cy, k1, k2, k3, k4), got 5",
         ),
         (
-            message(
-                ModelKind::BrownConrady5,
-                &[1.0, 1.0, 0.0, 0.0, -1e9, 0.0, 0.0, 0.0, 0.0],
-            ),
+            message(ModelKind::BrownConrady5, &[1.0, 1.0, 0.0, 0.0, -1e9, 0.0, 0.0, 0.0, 0.0]),
             "k1, k2, p1, p2, k3",
         ),
     ];
