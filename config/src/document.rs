@@ -118,7 +118,7 @@ fn checked<T: DeserializeOwned + JsonSchema>(source: &Source) -> Result<(T, Node
     if !problems.is_empty() {
         return Err(problems);
     }
-    parsed.deserialize(source).map_err(|problem| vec![problem])
+    parsed.deserialize(source)
 }
 
 fn invalid(problems: Vec<Problem>) -> Error {

@@ -162,7 +162,7 @@ impl Parsed<'_> {
     }
 
     /// By serde. The error has the place that serde knows, the smallest value it had a place for.
-    pub(crate) fn deserialize<T: DeserializeOwned>(self, source: &Source) -> Result<(T, Node), Problem> {
+    pub(crate) fn deserialize<T: DeserializeOwned>(self, source: &Source) -> Result<(T, Node), Vec<Problem>> {
         let (span, table) = (self.table.span(), self.table.into_inner());
         let spanned = toml::Spanned::new(span, DeValue::Table(table));
         match T::deserialize(ValueDeserializer::from(spanned)) {
@@ -171,7 +171,7 @@ impl Parsed<'_> {
                 let span = error.span().unwrap_or(0..0);
                 let path = self.root.path_of(&span);
                 let message = error.message().lines().collect::<Vec<_>>().join("; ");
-                Err(Problem::new(source, span, &path, message))
+                Err(vec![Problem::new(source, span, &path, message)])
             }
         }
     }

@@ -43,11 +43,11 @@ pub(crate) fn align(old: &[&Value], new: &[&Value]) -> Vec<Option<usize>> {
     if middle_old.len().saturating_mul(middle_new.len()) <= 1_000_000 {
         for same_one in [same_name as fn(&Value, &Value) -> bool, same] {
             for to in middle_new.clone() {
-                let candidates = middle_old.clone().filter(|&from| match (old.get(from), new.get(to)) {
+                let mut candidates = middle_old.clone().filter(|&from| match (old.get(from), new.get(to)) {
                     (Some(a), Some(b)) => same_one(a, b),
                     _ => false,
                 });
-                if let Some(from) = candidates.last() {
+                if let Some(from) = candidates.next_back() {
                     pair(&mut matched, to, from);
                 }
             }
