@@ -1,4 +1,5 @@
 //! Figures against closed forms, and inputs that do not fit.
+#![allow(clippy::unwrap_used, reason = "helpers of tests panic as tests do")]
 
 use std::sync::Arc;
 
@@ -15,17 +16,7 @@ fn colour(width: usize, height: usize, pixel: impl Fn(usize, usize) -> Vec3) -> 
 }
 
 fn measure(a: &Image, b: &Image, options: &CompareOptions<'_>) -> Result<Comparison, CompareError> {
-    compare(
-        Named {
-            name: "a.exr",
-            image: a,
-        },
-        Named {
-            name: "b.exr",
-            image: b,
-        },
-        options,
-    )
+    compare(Named { name: "a.exr", image: a }, Named { name: "b.exr", image: b }, options)
 }
 
 fn close(value: Option<f64>, expected: f64) -> bool {
@@ -39,14 +30,8 @@ fn constant_difference() {
     let b = colour(20, 16, |_, _| Vec3::new(0.25, 3.0, 0.5));
     let figures = measure(&a, &b, &CompareOptions::default()).unwrap().report.all;
     // Clipped at 4, green differs by 1 only.
-    assert!(close(
-        figures.rmse_linear,
-        ((0.0625f64 + 1.0 + 0.0625) / 3.0).sqrt()
-    ));
-    assert!(close(
-        figures.rmse_linear_unclipped,
-        ((0.0625f64 + 9.0 + 0.0625) / 3.0).sqrt()
-    ));
+    assert!(close(figures.rmse_linear, ((0.0625f64 + 1.0 + 0.0625) / 3.0).sqrt()));
+    assert!(close(figures.rmse_linear_unclipped, ((0.0625f64 + 9.0 + 0.0625) / 3.0).sqrt()));
     assert!(close(figures.max_abs_difference, 3.0));
     assert_eq!(figures.mean_difference["R"], 0.25);
     assert_eq!(figures.mean_difference["B"], -0.25);
@@ -77,13 +62,7 @@ fn tiny_images_have_no_ssim_and_do_not_crash() {
         let comparison = measure(&a, &b, &CompareOptions::default()).unwrap();
         assert_eq!(comparison.report.all.ssim, None);
         assert!(comparison.report.all.flip_mean.unwrap() > 0.0);
-        assert!(
-            comparison
-                .report
-                .notes
-                .iter()
-                .any(|note| note.contains("no SSIM"))
-        );
+        assert!(comparison.report.notes.iter().any(|note| note.contains("no SSIM")));
         difference_picture(&comparison, None).unwrap();
         flip_picture(&comparison).unwrap();
     }
@@ -97,10 +76,7 @@ fn sets_follow_coverage() {
     let shares = (0..24 * 12).map(|i| [0.0, 1.0, 0.5][i % 24 / 8]).collect();
     let coverage = Image::from_plane(24, 12, "Y", shares).unwrap();
     let options = CompareOptions {
-        coverage: Some(Named {
-            name: "truth.exr#coverage",
-            image: &coverage,
-        }),
+        coverage: Some(Named { name: "truth.exr#coverage", image: &coverage }),
         ..CompareOptions::default()
     };
     let sets = measure(&a, &b, &options).unwrap().report.sets.unwrap();
@@ -116,13 +92,8 @@ fn sets_follow_coverage() {
 fn an_empty_set_has_no_figures() {
     let a = colour(4, 4, |_, _| Vec3::ONE);
     let coverage = Image::from_plane(4, 4, "Y", vec![0.0; 16]).unwrap();
-    let options = CompareOptions {
-        coverage: Some(Named {
-            name: "c",
-            image: &coverage,
-        }),
-        ..CompareOptions::default()
-    };
+    let options =
+        CompareOptions { coverage: Some(Named { name: "c", image: &coverage }), ..CompareOptions::default() };
     let sets = measure(&a, &a, &options).unwrap().report.sets.unwrap();
     assert_eq!((sets.edge.pixels, sets.edge.rmse_linear), (0, None));
 }
@@ -131,28 +102,13 @@ fn an_empty_set_has_no_figures() {
 fn coverage_must_be_a_share_and_of_the_size() {
     let a = colour(4, 4, |_, _| Vec3::ONE);
     let with = |coverage: &Image| {
-        let coverage = Some(Named {
-            name: "truth.exr#coverage",
-            image: coverage,
-        });
-        measure(
-            &a,
-            &a,
-            &CompareOptions {
-                coverage,
-                ..CompareOptions::default()
-            },
-        )
-        .unwrap_err()
-        .to_string()
+        let coverage = Some(Named { name: "truth.exr#coverage", image: coverage });
+        measure(&a, &a, &CompareOptions { coverage, ..CompareOptions::default() }).unwrap_err().to_string()
     };
     let mut shares = vec![0.0; 16];
     shares[6] = 1.5;
     let message = with(&Image::from_plane(4, 4, "Y", shares).unwrap());
-    assert!(
-        message.contains("truth.exr#coverage") && message.contains("1.5 at pixel (2, 1)"),
-        "{message}"
-    );
+    assert!(message.contains("truth.exr#coverage") && message.contains("1.5 at pixel (2, 1)"), "{message}");
     let message = with(&Image::from_plane(2, 4, "Y", vec![f32::NAN; 8]).unwrap());
     assert!(message.contains("2x4") && message.contains("4x4"), "{message}");
 }
@@ -169,17 +125,11 @@ fn non_finite_pixels_are_left_out_and_counted() {
     let report = measure(&a, &b, &CompareOptions::default()).unwrap().report;
     assert_eq!((report.all.pixels, report.all.pixels_excluded), (574, 2));
     assert_eq!((report.a.nan_samples, report.a.infinite_samples), (1, 1));
-    assert_eq!(
-        (report.all.rmse_linear, report.all.flip_mean),
-        (Some(0.0), Some(0.0))
-    );
+    assert_eq!((report.all.rmse_linear, report.all.flip_mean), (Some(0.0), Some(0.0)));
     assert!(report.notes.iter().any(|note| note.starts_with("2 pixels")));
     let nothing = colour(24, 24, |_, _| Vec3::NAN);
     let report = measure(&nothing, &b, &CompareOptions::default()).unwrap().report;
-    assert_eq!(
-        (report.all.pixels, report.all.rmse_linear, report.all.ssim),
-        (0, None, None)
-    );
+    assert_eq!((report.all.pixels, report.all.rmse_linear, report.all.ssim), (0, None, None));
 }
 
 #[test]
@@ -187,42 +137,15 @@ fn exposure_and_response_change_only_what_is_displayed() {
     let a = colour(12, 12, |_, _| Vec3::splat(0.1));
     let b = colour(12, 12, |_, _| Vec3::splat(0.2));
     let with = |exposure_ev, response| {
-        let display = DisplayTransform {
-            exposure_ev,
-            response,
-        };
-        measure(
-            &a,
-            &b,
-            &CompareOptions {
-                display,
-                ..CompareOptions::default()
-            },
-        )
-        .unwrap()
-        .report
-        .all
+        let display = DisplayTransform { exposure_ev, response };
+        measure(&a, &b, &CompareOptions { display, ..CompareOptions::default() }).unwrap().report.all
     };
     let linear = with(1.0, Some(Arc::new(|_: usize, radiance: f32| radiance)));
     assert!(close(linear.rmse_linear, 0.1));
     assert!(close(linear.rmse_display, 0.2));
-    let display = DisplayTransform {
-        exposure_ev: 0.0,
-        response: Some(Arc::new(|_, _| f32::NAN)),
-    };
-    let error = measure(
-        &a,
-        &b,
-        &CompareOptions {
-            display,
-            ..CompareOptions::default()
-        },
-    )
-    .unwrap_err();
-    assert!(
-        matches!(error, CompareError::Response { channel: 0, .. }),
-        "{error}"
-    );
+    let display = DisplayTransform { exposure_ev: 0.0, response: Some(Arc::new(|_, _| f32::NAN)) };
+    let error = measure(&a, &b, &CompareOptions { display, ..CompareOptions::default() }).unwrap_err();
+    assert!(matches!(error, CompareError::Response { channel: 0, .. }), "{error}");
 }
 
 #[test]
@@ -231,36 +154,20 @@ fn data_layers_are_compared_unclipped_without_display_figures() {
     let comparison = measure(&depth(10.0), &depth(12.0), &CompareOptions::default()).unwrap();
     let report = &comparison.report;
     assert_eq!((report.clip_white, report.all.rmse_linear), (None, Some(2.0)));
-    assert_eq!(
-        (report.all.psnr_db, report.all.ssim, report.all.flip_mean),
-        (None, None, None)
-    );
-    assert!(matches!(
-        flip_picture(&comparison),
-        Err(CompareError::NotColour { .. })
-    ));
+    assert_eq!((report.all.psnr_db, report.all.ssim, report.all.flip_mean), (None, None, None));
+    assert!(matches!(flip_picture(&comparison), Err(CompareError::NotColour { .. })));
 }
 
 #[test]
 fn images_that_do_not_fit_are_both_named() {
     let a = colour(4, 4, |_, _| Vec3::ONE);
-    let message = |b: &Image| {
-        measure(&a, b, &CompareOptions::default())
-            .unwrap_err()
-            .to_string()
-    };
+    let message = |b: &Image| measure(&a, b, &CompareOptions::default()).unwrap_err().to_string();
     for (b, words) in [
         (colour(5, 4, |_, _| Vec3::ONE), ["4x4", "5x4"]),
-        (
-            Image::from_plane(4, 4, "Y", vec![1.0; 16]).unwrap(),
-            ["R G B", " Y"],
-        ),
+        (Image::from_plane(4, 4, "Y", vec![1.0; 16]).unwrap(), ["R G B", " Y"]),
     ] {
         let message = message(&b);
-        assert!(
-            message.contains("a.exr") && message.contains("b.exr"),
-            "{message}"
-        );
+        assert!(message.contains("a.exr") && message.contains("b.exr"), "{message}");
         assert!(words.iter().all(|word| message.contains(word)), "{message}");
     }
 }
@@ -269,31 +176,12 @@ fn images_that_do_not_fit_are_both_named() {
 fn options_out_of_range_are_named() {
     let a = colour(4, 4, |_, _| Vec3::ONE);
     for clip_white in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        let options = CompareOptions {
-            clip_white,
-            ..CompareOptions::default()
-        };
-        assert!(
-            measure(&a, &a, &options)
-                .unwrap_err()
-                .to_string()
-                .contains("clip")
-        );
+        let options = CompareOptions { clip_white, ..CompareOptions::default() };
+        assert!(measure(&a, &a, &options).unwrap_err().to_string().contains("clip"));
     }
-    let display = DisplayTransform {
-        exposure_ev: f32::NAN,
-        response: None,
-    };
-    let options = CompareOptions {
-        display,
-        ..CompareOptions::default()
-    };
-    assert!(
-        measure(&a, &a, &options)
-            .unwrap_err()
-            .to_string()
-            .contains("exposure")
-    );
+    let display = DisplayTransform { exposure_ev: f32::NAN, response: None };
+    let options = CompareOptions { display, ..CompareOptions::default() };
+    assert!(measure(&a, &a, &options).unwrap_err().to_string().contains("exposure"));
     let comparison = measure(&a, &a, &CompareOptions::default()).unwrap();
     assert!(difference_picture(&comparison, Some(0.0)).is_err());
 }
@@ -313,10 +201,8 @@ fn files_with_layers_and_pictures() {
     let path = |name: &str| folder.path().join(name);
     let text = |name: &str| path(name).to_string_lossy().into_owned();
     let mut file = LayeredImage::default();
-    file.push("real", colour(40, 30, |x, _| Vec3::splat(x as f32 / 40.0)))
-        .unwrap();
-    file.push("mixed", colour(40, 30, |x, _| Vec3::splat(x as f32 / 50.0)))
-        .unwrap();
+    file.push("real", colour(40, 30, |x, _| Vec3::splat(x as f32 / 40.0))).unwrap();
+    file.push("mixed", colour(40, 30, |x, _| Vec3::splat(x as f32 / 50.0))).unwrap();
     write_exr(path("truth.exr"), &file, Precision::Float).unwrap();
     write_png(path("shot.png"), file.layer("mixed").unwrap(), BitDepth::Sixteen).unwrap();
 

@@ -1,4 +1,5 @@
 //! PNG and JPEG: bit depths, alpha, the sRGB curve, and what cannot be written.
+#![allow(clippy::unwrap_used, reason = "helpers of tests panic as tests do")]
 
 use std::path::Path;
 
@@ -7,15 +8,8 @@ use coshade_reference::image_file::{
 };
 
 fn ramp(names: &[&str]) -> Image {
-    let samples = |index: usize| {
-        (0..256)
-            .map(|i| ((i + index * 40) % 256) as f32 / 255.0)
-            .collect()
-    };
-    let channel = |(index, name): (usize, &&str)| Channel {
-        name: (*name).into(),
-        samples: samples(index),
-    };
+    let samples = |index: usize| (0..256).map(|i| ((i + index * 40) % 256) as f32 / 255.0).collect();
+    let channel = |(index, name): (usize, &&str)| Channel { name: (*name).into(), samples: samples(index) };
     Image::new(16, 16, names.iter().enumerate().map(channel).collect()).unwrap()
 }
 
@@ -52,26 +46,11 @@ fn png_clips_and_says_what_it_cannot_hold() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("x.png");
     let plane = |name: &str, samples: Vec<f32>| Image::from_plane(samples.len(), 1, name, samples).unwrap();
-    write_png(
-        &path,
-        &plane("Y", vec![-1.0, 7.0, f32::INFINITY]),
-        BitDepth::Eight,
-    )
-    .unwrap();
-    assert_eq!(
-        read(&path).unwrap().layers[0].image.channel("Y").unwrap(),
-        [0.0, 1.0, 1.0]
-    );
-    let message = write_png(&path, &plane("Y", vec![f32::NAN]), BitDepth::Eight)
-        .unwrap_err()
-        .to_string();
-    assert!(
-        message.contains("x.png") && message.contains("1 samples are NaN"),
-        "{message}"
-    );
-    let message = write_png(&path, &plane("Z", vec![1.0]), BitDepth::Eight)
-        .unwrap_err()
-        .to_string();
+    write_png(&path, &plane("Y", vec![-1.0, 7.0, f32::INFINITY]), BitDepth::Eight).unwrap();
+    assert_eq!(read(&path).unwrap().layers[0].image.channel("Y").unwrap(), [0.0, 1.0, 1.0]);
+    let message = write_png(&path, &plane("Y", vec![f32::NAN]), BitDepth::Eight).unwrap_err().to_string();
+    assert!(message.contains("x.png") && message.contains("1 samples are NaN"), "{message}");
+    let message = write_png(&path, &plane("Z", vec![1.0]), BitDepth::Eight).unwrap_err().to_string();
     assert!(message.contains("not Z"), "{message}");
 }
 
@@ -84,16 +63,9 @@ fn jpegs_read() {
         let image = read(folder.join(name)).unwrap().layers.remove(0).image;
         assert_eq!((image.width(), image.height()), (56, 40));
         for (channel, expected) in [("R", 4.0 * 27.5), ("G", 6.0 * 19.5)] {
-            let codes = image
-                .channel(channel)
-                .unwrap()
-                .iter()
-                .map(|&v| 255.0 * srgb::encode(f64::from(v)));
+            let codes = image.channel(channel).unwrap().iter().map(|&v| 255.0 * srgb::encode(f64::from(v)));
             let mean = codes.sum::<f64>() / (56.0 * 40.0);
-            assert!(
-                (mean - expected).abs() < 2.0,
-                "{name} {channel}: {mean} {expected}"
-            );
+            assert!((mean - expected).abs() < 2.0, "{name} {channel}: {mean} {expected}");
         }
     }
 }
@@ -104,27 +76,11 @@ fn files_that_are_no_images_are_named() {
     let path = folder.path().join("notes.png");
     std::fs::write(&path, "hello, world").unwrap();
     let message = read(&path).unwrap_err().to_string();
-    assert!(
-        message.contains("notes.png") && message.contains("68 65 6c 6c"),
-        "{message}"
-    );
+    assert!(message.contains("notes.png") && message.contains("68 65 6c 6c"), "{message}");
     std::fs::write(&path, "").unwrap();
     assert!(read(&path).unwrap_err().to_string().contains("an empty file"));
-    assert!(
-        read(folder.path())
-            .unwrap_err()
-            .to_string()
-            .contains("not a regular file")
-    );
-    assert!(
-        read(folder.path().join("none.exr"))
-            .unwrap_err()
-            .to_string()
-            .contains("none.exr")
-    );
-    let tiny = ReadLimits {
-        max_decoded_bytes: 4,
-        ..ReadLimits::default()
-    };
+    assert!(read(folder.path()).unwrap_err().to_string().contains("not a regular file"));
+    assert!(read(folder.path().join("none.exr")).unwrap_err().to_string().contains("none.exr"));
+    let tiny = ReadLimits { max_decoded_bytes: 4, ..ReadLimits::default() };
     assert!(read_bytes(&path, b"#?RADIANCE\n\n-Y 1 +X 1\nabcd", &tiny).is_err());
 }

@@ -1,29 +1,17 @@
 //! Real environment maps against what OpenEXR and OpenCV read in them (`tests/data/read_environments.py`).
 
-use std::path::{Path, PathBuf};
-
 use coshade_reference::image_file::read;
-
-fn data() -> PathBuf {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    std::env::var_os("COSHADE_DATA").map_or_else(beside, PathBuf::from)
-}
 
 #[test]
 fn real_maps_read_as_other_readers_read_them() {
-    let folder = data().join("environment/equirect");
-    if !folder.is_dir() {
-        println!("skipped: real_maps_read_as_other_readers_read_them: no data");
-        return;
-    }
+    let test = "real_maps_read_as_other_readers_read_them";
+    let Some(folder) = coshade_testdata::find(test, "environment/equirect") else { return };
     let expected = include_str!("data/environments.json");
     let expected: serde_json::Map<String, serde_json::Value> = serde_json::from_str(expected).unwrap();
     assert_eq!(expected.len(), 9);
     for (name, channels) in expected {
         let file = read(folder.join(&name)).unwrap();
-        let [layer] = file.layers.as_slice() else {
-            panic!("{name}: {} layers", file.layers.len())
-        };
+        let [layer] = file.layers.as_slice() else { panic!("{name}: {} layers", file.layers.len()) };
         let image = &layer.image;
         let channels = channels.as_object().unwrap();
         assert_eq!(image.channels().len(), channels.len(), "{name}");
@@ -33,22 +21,10 @@ fn real_maps_read_as_other_readers_read_them() {
             let least = samples.iter().copied().fold(f32::INFINITY, f32::min);
             let largest = samples.iter().copied().fold(f32::NEG_INFINITY, f32::max);
             let mean = samples.iter().map(|&s| f64::from(s)).sum::<f64>() / samples.len() as f64;
-            assert_eq!(
-                (image.width() as f64, image.height() as f64),
-                (figure(0), figure(1)),
-                "{name}"
-            );
-            assert_eq!(
-                (least, largest),
-                (figure(2) as f32, figure(4) as f32),
-                "{name} {channel}"
-            );
+            assert_eq!((image.width() as f64, image.height() as f64), (figure(0), figure(1)), "{name}");
+            assert_eq!((least, largest), (figure(2) as f32, figure(4) as f32), "{name} {channel}");
             // Sums of a million doubles in another order.
-            assert!(
-                (mean - figure(3)).abs() <= 1e-9 * figure(3),
-                "{name} {channel}: {mean} {}",
-                figure(3)
-            );
+            assert!((mean - figure(3)).abs() <= 1e-9 * figure(3), "{name} {channel}: {mean} {}", figure(3));
         }
     }
 }

@@ -17,17 +17,11 @@ fn figures_agree_with_the_peers() {
         let report = run(&CompareArgs::new(path(&a), path(b))).unwrap();
         let ours = serde_json::to_value(&report).unwrap();
         // The peers' FLIP works in f32; a PSNR in dB magnifies relative errors by 8.7.
-        for (figure, tolerance) in [
-            ("rmse_linear", 1e-6),
-            ("psnr_db", 1e-5),
-            ("ssim", 1e-6),
-            ("flip_mean", 1e-5),
-        ] {
+        for (figure, tolerance) in
+            [("rmse_linear", 1e-6), ("psnr_db", 1e-5), ("ssim", 1e-6), ("flip_mean", 1e-5)]
+        {
             let (ours, theirs) = (ours[figure].as_f64().unwrap(), peer[figure].as_f64().unwrap());
-            assert!(
-                (ours - theirs).abs() < tolerance,
-                "{a} {figure}: {ours} is not {theirs}"
-            );
+            assert!((ours - theirs).abs() < tolerance, "{a} {figure}: {ours} is not {theirs}");
         }
     }
 }

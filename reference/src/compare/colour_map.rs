@@ -21,18 +21,10 @@ pub(super) fn diverging(value: f64) -> [u8; 3] {
 fn srgb_from_lab([lightness, a, b]: [f64; 3]) -> [u8; 3] {
     let cube = |t: f64| {
         let threshold = 6.0 / 29.0;
-        if t > threshold {
-            t * t * t
-        } else {
-            3.0 * threshold * threshold * (t - 4.0 / 29.0)
-        }
+        if t > threshold { t * t * t } else { 3.0 * threshold * threshold * (t - 4.0 / 29.0) }
     };
     let y = (lightness + 16.0) / 116.0;
-    let [x, y, z] = [
-        0.95047 * cube(y + a / 500.0),
-        cube(y),
-        1.08883 * cube(y - b / 200.0),
-    ];
+    let [x, y, z] = [0.95047 * cube(y + a / 500.0), cube(y), 1.08883 * cube(y - b / 200.0)];
     let linear = [
         3.2404542 * x - 1.5371385 * y - 0.4985314 * z,
         -0.969266 * x + 1.8760108 * y + 0.041556 * z,
@@ -75,10 +67,7 @@ pub(super) fn magma(value: f64) -> [u8; 3] {
     ];
     let t = value.clamp(0.0, 1.0);
     COEFFICIENTS.map(|coefficients| {
-        let code = coefficients
-            .iter()
-            .rev()
-            .fold(0.0, |sum, coefficient| sum * t + coefficient);
+        let code = coefficients.iter().rev().fold(0.0, |sum, coefficient| sum * t + coefficient);
         (code.clamp(0.0, 1.0) * 255.0).round() as u8
     })
 }
@@ -101,10 +90,7 @@ mod tests {
     #[test]
     fn zero_is_neutral_and_the_ends_are_morelands() {
         let [r, g, b] = diverging(0.0);
-        assert!(
-            r.abs_diff(g) <= 1 && g.abs_diff(b) <= 1 && (215..=230).contains(&g),
-            "{r} {g} {b}"
-        );
+        assert!(r.abs_diff(g) <= 1 && g.abs_diff(b) <= 1 && (215..=230).contains(&g), "{r} {g} {b}");
         let near =
             |colour: [u8; 3], expected: [u8; 3]| colour.iter().zip(expected).all(|(a, b)| a.abs_diff(b) <= 3);
         assert!(near(diverging(-1.0), [59, 76, 192]), "{:?}", diverging(-1.0));

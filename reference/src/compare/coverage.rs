@@ -18,18 +18,12 @@ pub(super) enum PixelSet {
 /// Sorts the pixels of a coverage layer into sets. It has one channel, or several that are the same; alpha counts only
 /// if it is alone.
 pub(super) fn pixel_sets(coverage: &Image, name: &str) -> Result<Vec<PixelSet>, CompareError> {
-    let error = |reason: String| CompareError::Coverage {
-        coverage: name.into(),
-        reason,
-    };
+    let error = |reason: String| CompareError::Coverage { coverage: name.into(), reason };
     let mut planes = coverage.channels().iter().filter(|channel| channel.name != "A");
     let first = planes.next().or(coverage.channels().first());
     let first = first.ok_or_else(|| error("it has no channel".into()))?;
     if let Some(other) = planes.find(|other| other.samples != first.samples) {
-        return Err(error(format!(
-            "channels {} and {} differ",
-            first.name, other.name
-        )));
+        return Err(error(format!("channels {} and {} differ", first.name, other.name)));
     }
     let set = |(index, &share): (usize, &f32)| match share {
         share if share.abs() <= ROUNDING => Ok(PixelSet::Real),

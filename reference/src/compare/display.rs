@@ -30,11 +30,7 @@ impl DisplayTransform {
 
     /// `sRGB` or `camera response`.
     pub fn name(&self) -> &'static str {
-        if self.response.is_some() {
-            "camera response"
-        } else {
-            "sRGB"
-        }
+        if self.response.is_some() { "camera response" } else { "sRGB" }
     }
 }
 

@@ -52,12 +52,7 @@ pub(super) fn figures(
     figures.max_abs_difference = Some(largest);
 
     if let (Some(display), Some(maps)) = (&prepared.display, maps) {
-        let square: f64 = display
-            .a
-            .iter()
-            .zip(&display.b)
-            .map(|(a, b)| square_sum(a, b, &counted))
-            .sum();
+        let square: f64 = display.a.iter().zip(&display.b).map(|(a, b)| square_sum(a, b, &counted)).sum();
         let rmse_display = (square / samples).sqrt();
         figures.rmse_display = Some(rmse_display);
         figures.psnr_db = psnr(rmse_display);
@@ -71,10 +66,7 @@ pub(super) fn figures(
 }
 
 fn square_sum(a: &[f32], b: &[f32], pixels: &[usize]) -> f64 {
-    pixels
-        .iter()
-        .map(|&i| (f64::from(a[i]) - f64::from(b[i])).powi(2))
-        .sum()
+    pixels.iter().map(|&i| (f64::from(a[i]) - f64::from(b[i])).powi(2)).sum()
 }
 
 fn psnr(rmse: f64) -> Option<f64> {

@@ -90,16 +90,12 @@ fn filter(plane: &[f64], grid: Grid, gaussians: &[(f64, f64)]) -> Vec<f64> {
             (weight * (pi / width).sqrt(), (-radius..=radius).map(at).collect())
         })
         .collect();
-    let volume: f64 = kernels
-        .iter()
-        .map(|(weight, kernel)| weight * kernel.iter().sum::<f64>().powi(2))
-        .sum();
+    let volume: f64 =
+        kernels.iter().map(|(weight, kernel)| weight * kernel.iter().sum::<f64>().powi(2)).sum();
     let mut sum = vec![0.0; plane.len()];
     for (weight, kernel) in &kernels {
         let part = convolve_separable(plane, grid, kernel, kernel);
-        sum.par_iter_mut()
-            .zip(part)
-            .for_each(|(sum, part)| *sum += weight / volume * part);
+        sum.par_iter_mut().zip(part).for_each(|(sum, part)| *sum += weight / volume * part);
     }
     sum
 }
@@ -135,10 +131,7 @@ fn features(y: &[f64], grid: Grid) -> Vec<(f64, f64)> {
 fn balanced(kernel: Vec<f64>) -> Vec<f64> {
     let positive: f64 = kernel.iter().filter(|weight| **weight > 0.0).sum();
     let negative: f64 = -kernel.iter().filter(|weight| **weight < 0.0).sum::<f64>();
-    kernel
-        .into_iter()
-        .map(|weight| weight / if weight > 0.0 { positive } else { negative })
-        .collect()
+    kernel.into_iter().map(|weight| weight / if weight > 0.0 { positive } else { negative }).collect()
 }
 
 /// Section 4.1.3: distances up to `LOW_ERROR_SHARE` of the largest spread over most of [0, 1].
@@ -165,38 +158,18 @@ fn hyab(a: Vec3d, b: Vec3d) -> f64 {
 fn hunt_lab(rgb: Vec3d) -> Vec3d {
     let threshold = 6.0f64 / 29.0;
     let root = |t: f64| {
-        if t > threshold.powi(3) {
-            t.cbrt()
-        } else {
-            t / (3.0 * threshold * threshold) + 4.0 / 29.0
-        }
+        if t > threshold.powi(3) { t.cbrt() } else { t / (3.0 * threshold * threshold) + 4.0 / 29.0 }
     };
     let [x, y, z] = relative_xyz(rgb).map(root);
     let lightness = 116.0 * y - 16.0;
-    [
-        lightness,
-        0.01 * lightness * 500.0 * (x - y),
-        0.01 * lightness * 200.0 * (y - z),
-    ]
+    [lightness, 0.01 * lightness * 500.0 * (x - y), 0.01 * lightness * 200.0 * (y - z)]
 }
 
 /// Linear Rec.709 RGB to XYZ: the exact fractions of the primaries and D65, as in the authors' code.
 const XYZ_FROM_RGB: [Vec3d; 3] = [
-    [
-        10_135_552.0 / 24_577_794.0,
-        8_788_810.0 / 24_577_794.0,
-        4_435_075.0 / 24_577_794.0,
-    ],
-    [
-        2_613_072.0 / 12_288_897.0,
-        8_788_810.0 / 12_288_897.0,
-        887_015.0 / 12_288_897.0,
-    ],
-    [
-        1_425_312.0 / 73_733_382.0,
-        8_788_810.0 / 73_733_382.0,
-        70_074_185.0 / 73_733_382.0,
-    ],
+    [10_135_552.0 / 24_577_794.0, 8_788_810.0 / 24_577_794.0, 4_435_075.0 / 24_577_794.0],
+    [2_613_072.0 / 12_288_897.0, 8_788_810.0 / 12_288_897.0, 887_015.0 / 12_288_897.0],
+    [1_425_312.0 / 73_733_382.0, 8_788_810.0 / 73_733_382.0, 70_074_185.0 / 73_733_382.0],
 ];
 const RGB_FROM_XYZ: [Vec3d; 3] = [
     [3.241003275, -1.537398934, -0.498615861],
@@ -212,10 +185,7 @@ fn relative_xyz(rgb: Vec3d) -> Vec3d {
 }
 
 fn linear_rgb(relative_xyz: Vec3d) -> Vec3d {
-    multiply(
-        &RGB_FROM_XYZ,
-        [0, 1, 2].map(|axis| relative_xyz[axis] * WHITE_XYZ[axis]),
-    )
+    multiply(&RGB_FROM_XYZ, [0, 1, 2].map(|axis| relative_xyz[axis] * WHITE_XYZ[axis]))
 }
 
 fn multiply(matrix: &[Vec3d; 3], v: Vec3d) -> Vec3d {
@@ -234,12 +204,8 @@ mod tests {
             state >> 27
         };
         let pixel = |x: usize, y: usize| {
-            let square = if (x / 9 + y / 7) % 2 == 0 { 140 } else { 20 };
-            [
-                square + x as u32 % 80,
-                255 * u32::from(x > width / 2),
-                (y * 5) as u32 % 200,
-            ]
+            let square = if (x / 9 + y / 7).is_multiple_of(2) { 140 } else { 20 };
+            [square + x as u32 % 80, 255 * u32::from(x > width / 2), (y * 5) as u32 % 200]
         };
         (0..width * height)
             .flat_map(|i| pixel(i % width, i / width))
@@ -248,14 +214,7 @@ mod tests {
     }
 
     fn planes(bytes: &[u8]) -> Vec<Vec<f32>> {
-        let plane = |axis| {
-            bytes
-                .iter()
-                .skip(axis)
-                .step_by(3)
-                .map(|&code| f32::from(code) / 255.0)
-                .collect()
-        };
+        let plane = |axis| bytes.iter().skip(axis).step_by(3).map(|&code| f32::from(code) / 255.0).collect();
         (0..3).map(plane).collect()
     }
 
@@ -267,11 +226,7 @@ mod tests {
             let ours = flip_map(&planes(&a), &planes(&b), grid);
             let image = |bytes| nv_flip::FlipImageRgb8::with_data(width as u32, height as u32, bytes);
             let theirs = nv_flip::flip(image(&a), image(&b), PIXELS_PER_DEGREE as f32).to_vec();
-            let worst = ours
-                .iter()
-                .zip(&theirs)
-                .map(|(a, b)| (a - f64::from(*b)).abs())
-                .fold(0.0, f64::max);
+            let worst = ours.iter().zip(&theirs).map(|(a, b)| (a - f64::from(*b)).abs()).fold(0.0, f64::max);
             // Theirs works in f32; the power of 0.7 and the root of the feature term magnify its rounding
             // (1e-7 of values up to 116) where the images nearly agree.
             assert!(worst < 2e-4, "{width}x{height}: {worst}");
@@ -280,24 +235,13 @@ mod tests {
 
     #[test]
     fn identical_images_have_no_error_and_opposites_the_largest() {
-        let grid = Grid {
-            width: 30,
-            height: 30,
-        };
+        let grid = Grid { width: 30, height: 30 };
         let plane = |value| vec![vec![value; 900]; 3];
-        assert!(
-            flip_map(&plane(0.3), &plane(0.3), grid)
-                .iter()
-                .all(|error| *error == 0.0)
-        );
+        assert!(flip_map(&plane(0.3), &plane(0.3), grid).iter().all(|error| *error == 0.0));
         let (green, mut blue) = (vec![vec![0.0; 900], vec![1.0; 900], vec![0.0; 900]], plane(0.0));
         blue[2] = vec![1.0; 900];
         // Green against blue is the distance that the scale ends at.
         let worst = flip_map(&green, &blue, grid);
-        assert!(
-            worst.iter().all(|error| (error - 1.0).abs() < 1e-6),
-            "{:?}",
-            &worst[..3]
-        );
+        assert!(worst.iter().all(|error| (error - 1.0).abs() < 1e-6), "{:?}", &worst[..3]);
     }
 }

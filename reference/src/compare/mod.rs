@@ -58,11 +58,7 @@ pub struct CompareOptions<'a> {
 impl Default for CompareOptions<'_> {
     /// Clip at 4 × white, sRGB at 0 EV, no coverage.
     fn default() -> Self {
-        Self {
-            clip_white: 4.0,
-            display: DisplayTransform::default(),
-            coverage: None,
-        }
+        Self { clip_white: 4.0, display: DisplayTransform::default(), coverage: None }
     }
 }
 
@@ -89,10 +85,7 @@ pub struct Comparison {
 pub fn compare(a: Named<'_>, b: Named<'_>, options: &CompareOptions<'_>) -> Result<Comparison, CompareError> {
     check_options(options)?;
     let prepared = prepare::prepare(a, b, &options.display)?;
-    let sets = options
-        .coverage
-        .map(|coverage| sets_of(a, coverage))
-        .transpose()?;
+    let sets = options.coverage.map(|coverage| sets_of(a, coverage)).transpose()?;
     let maps = prepared.display.as_ref().map(|display| Maps {
         ssim: ssim::ssim_map(&display.a, &display.b, prepared.grid),
         flip: flip::flip_map(&display.a, &display.b, prepared.grid),
@@ -120,31 +113,19 @@ pub fn compare(a: Named<'_>, b: Named<'_>, options: &CompareOptions<'_>) -> Resu
         notes: notes(&prepared),
     };
     let difference = picture::signed_difference(&prepared, clip_white);
-    Ok(Comparison {
-        report,
-        difference,
-        flip: maps.map(|maps| maps.flip),
-    })
+    Ok(Comparison { report, difference, flip: maps.map(|maps| maps.flip) })
 }
 
 fn check_options(options: &CompareOptions<'_>) -> Result<(), CompareError> {
     let clip = options.clip_white;
     if !(clip > 0.0 && clip.is_finite()) {
         let expected = "a positive number of times white";
-        return Err(CompareError::Option {
-            option: "clip",
-            value: clip.to_string(),
-            expected,
-        });
+        return Err(CompareError::Option { option: "clip", value: clip.to_string(), expected });
     }
     let exposure = options.display.exposure_ev;
     if !(-64.0..=64.0).contains(&exposure) {
         let expected = "stops between -64 and 64";
-        return Err(CompareError::Option {
-            option: "exposure",
-            value: exposure.to_string(),
-            expected,
-        });
+        return Err(CompareError::Option { option: "exposure", value: exposure.to_string(), expected });
     }
     Ok(())
 }
@@ -168,12 +149,7 @@ fn input_info(named: Named<'_>) -> InputInfo {
         name: named.name.into(),
         width_px: named.image.width(),
         height_px: named.image.height(),
-        channels: named
-            .image
-            .channel_names()
-            .into_iter()
-            .map(String::from)
-            .collect(),
+        channels: named.image.channel_names().into_iter().map(String::from).collect(),
         nan_samples: census.nan,
         infinite_samples: census.infinite,
         negative_samples: census.negative,
@@ -191,9 +167,7 @@ fn notes(prepared: &prepare::Prepared<'_>) -> Vec<String> {
     let Grid { width, height } = prepared.grid;
     let window = 2 * ssim::RADIUS_PX + 1;
     if prepared.display.is_some() && (width < window || height < window) {
-        notes.push(format!(
-            "no SSIM: {width}x{height} px is smaller than its window of {window}x{window}"
-        ));
+        notes.push(format!("no SSIM: {width}x{height} px is smaller than its window of {window}x{window}"));
     }
     notes
 }

@@ -22,11 +22,7 @@ pub struct Picture {
 
 impl Picture {
     fn filled(width: usize, height: usize, colour: [u8; 3]) -> Self {
-        Self {
-            width,
-            height,
-            rgb: colour.repeat(width * height),
-        }
+        Self { width, height, rgb: colour.repeat(width * height) }
     }
 
     /// Sets a pixel; what lies outside is dropped.
@@ -65,11 +61,7 @@ pub(super) fn signed_difference(prepared: &Prepared<'_>, clip: Option<f32>) -> V
         let difference =
             |(a, b): (&&[f32], &&[f32])| (clipped(a[i]) - clipped(b[i])).clamp(f32::MIN, f32::MAX);
         let differences = prepared.a.iter().zip(&prepared.b).map(difference);
-        prepared.valid[i].then(|| {
-            differences
-                .max_by(|a, b| a.abs().total_cmp(&b.abs()))
-                .unwrap_or(0.0)
-        })
+        prepared.valid[i].then(|| differences.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0))
     };
     (0..prepared.grid.pixels()).map(at).collect()
 }
@@ -87,31 +79,16 @@ pub fn difference_picture(
         Some(limit) if limit > 0.0 && limit.is_finite() => limit,
         Some(limit) => {
             let expected = "a positive radiance";
-            return Err(CompareError::Option {
-                option: "diff-limit",
-                value: limit.to_string(),
-                expected,
-            });
+            return Err(CompareError::Option { option: "diff-limit", value: limit.to_string(), expected });
         }
         None => automatic_limit(&comparison.difference),
     };
     let scale = 1.0 / f64::from(limit);
     let colours = comparison.difference.iter().map(|difference| {
-        difference.map_or(BLACK, |difference| {
-            colour_map::diverging(f64::from(difference) * scale)
-        })
+        difference.map_or(BLACK, |difference| colour_map::diverging(f64::from(difference) * scale))
     });
-    let labels = [
-        format!("-{}", number(limit)),
-        "0".into(),
-        format!("+{}", number(limit)),
-    ];
-    let picture = with_legend(
-        comparison,
-        colours,
-        &|t| colour_map::diverging(2.0 * t - 1.0),
-        &labels,
-    );
+    let labels = [format!("-{}", number(limit)), "0".into(), format!("+{}", number(limit))];
+    let picture = with_legend(comparison, colours, &|t| colour_map::diverging(2.0 * t - 1.0), &labels);
     Ok(DifferencePicture { picture, limit })
 }
 
@@ -137,16 +114,8 @@ fn automatic_limit(difference: &[Option<f32>]) -> f32 {
     let rank = (magnitudes.len() as f64 * 0.995).ceil() as usize;
     let percentile = magnitudes.get(rank.saturating_sub(1)).copied().unwrap_or(0.0);
     // A few hot pixels may be all there is to see.
-    let magnitude = if percentile > 0.0 {
-        percentile
-    } else {
-        magnitudes.last().copied().unwrap_or(0.0)
-    };
-    if magnitude == 0.0 {
-        1.0
-    } else {
-        round_up_125(magnitude)
-    }
+    let magnitude = if percentile > 0.0 { percentile } else { magnitudes.last().copied().unwrap_or(0.0) };
+    if magnitude == 0.0 { 1.0 } else { round_up_125(magnitude) }
 }
 
 fn round_up_125(value: f32) -> f32 {
@@ -158,20 +127,12 @@ fn round_up_125(value: f32) -> f32 {
     let large_enough =
         |candidate: &f32| candidate.is_finite() && f64::from(*candidate) >= value * (1.0 - 1e-6);
     // The reciprocal of a subnormal limit would be infinite.
-    candidates
-        .into_iter()
-        .find(large_enough)
-        .unwrap_or(f32::MAX)
-        .max(f32::MIN_POSITIVE)
+    candidates.into_iter().find(large_enough).unwrap_or(f32::MAX).max(f32::MIN_POSITIVE)
 }
 
 /// `0.05`, `20`, and `2e-7` where digits would be too many.
 fn number(value: f32) -> String {
-    if (1e-3..1e4).contains(&value) {
-        format!("{value}")
-    } else {
-        format!("{value:e}")
-    }
+    if (1e-3..1e4).contains(&value) { format!("{value}") } else { format!("{value:e}") }
 }
 
 /// Puts pixels on a canvas with a colour bar and three labels (left, middle, right) beneath.
@@ -203,11 +164,7 @@ fn with_legend(
     }
     let text_top = bar_top + bar_height + 2 * zoom;
     let [low, middle, high] = labels;
-    let starts = [
-        margin,
-        (canvas_width - text_width(middle)) / 2,
-        canvas_width - margin - text_width(high),
-    ];
+    let starts = [margin, (canvas_width - text_width(middle)) / 2, canvas_width - margin - text_width(high)];
     for (label, start) in [low, middle, high].into_iter().zip(starts) {
         for (x, y) in font::dots(label) {
             for (dx, dy) in (0..zoom).flat_map(|dy| (0..zoom).map(move |dx| (dx, dy))) {
@@ -224,15 +181,8 @@ mod tests {
 
     #[test]
     fn limits_are_one_two_or_five() {
-        let cases = [
-            (0.011, 0.02),
-            (0.02, 0.02),
-            (0.021, 0.05),
-            (0.6, 1.0),
-            (1.0, 1.0),
-            (3.0, 5.0),
-            (7e-7, 1e-6),
-        ];
+        let cases =
+            [(0.011, 0.02), (0.02, 0.02), (0.021, 0.05), (0.6, 1.0), (1.0, 1.0), (3.0, 5.0), (7e-7, 1e-6)];
         for (value, expected) in cases {
             assert_eq!(round_up_125(value), expected);
         }

@@ -19,15 +19,11 @@ impl Grid {
 pub(super) fn convolve_separable(plane: &[f64], grid: Grid, kernel_x: &[f64], kernel_y: &[f64]) -> Vec<f64> {
     let Grid { width, height } = grid;
     let mut rows = vec![0.0; plane.len()];
-    rows.par_chunks_mut(width)
-        .zip(plane.par_chunks(width))
-        .for_each(|(target, source)| {
-            for (x, sum) in target.iter_mut().enumerate() {
-                *sum = taps(kernel_x, x, width)
-                    .map(|(weight, x)| weight * source[x])
-                    .sum();
-            }
-        });
+    rows.par_chunks_mut(width).zip(plane.par_chunks(width)).for_each(|(target, source)| {
+        for (x, sum) in target.iter_mut().enumerate() {
+            *sum = taps(kernel_x, x, width).map(|(weight, x)| weight * source[x]).sum();
+        }
+    });
     let mut result = vec![0.0; plane.len()];
     result.par_chunks_mut(width).enumerate().for_each(|(y, target)| {
         for (weight, y) in taps(kernel_y, y, height) {
@@ -44,10 +40,7 @@ pub(super) fn convolve_separable(plane: &[f64], grid: Grid, kernel_x: &[f64], ke
 fn taps(kernel: &[f64], centre: usize, length: usize) -> impl Iterator<Item = (f64, usize)> + '_ {
     let radius = kernel.len() / 2;
     let position = move |tap: usize| (centre + tap).saturating_sub(radius).min(length - 1);
-    kernel
-        .iter()
-        .enumerate()
-        .map(move |(tap, &weight)| (weight, position(tap)))
+    kernel.iter().enumerate().map(move |(tap, &weight)| (weight, position(tap)))
 }
 
 #[cfg(test)]
@@ -60,22 +53,13 @@ mod tests {
         let plane = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
         let right_neighbour = [0.0, 0.0, 1.0];
         let same = [1.0];
-        assert_eq!(
-            convolve_separable(&plane, grid, &right_neighbour, &same),
-            [2.0, 3.0, 3.0, 5.0, 6.0, 6.0]
-        );
-        assert_eq!(
-            convolve_separable(&plane, grid, &same, &right_neighbour),
-            [4.0, 5.0, 6.0, 4.0, 5.0, 6.0]
-        );
+        assert_eq!(convolve_separable(&plane, grid, &right_neighbour, &same), [2.0, 3.0, 3.0, 5.0, 6.0, 6.0]);
+        assert_eq!(convolve_separable(&plane, grid, &same, &right_neighbour), [4.0, 5.0, 6.0, 4.0, 5.0, 6.0]);
     }
 
     #[test]
     fn a_kernel_wider_than_the_image_keeps_a_constant() {
         let grid = Grid { width: 1, height: 1 };
-        assert_eq!(
-            convolve_separable(&[0.5], grid, &[0.25; 4], &[0.5, 0.5, 0.0]),
-            [0.5]
-        );
+        assert_eq!(convolve_separable(&[0.5], grid, &[0.25; 4], &[0.5, 0.5, 0.0]), [0.5]);
     }
 }

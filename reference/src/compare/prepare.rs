@@ -35,10 +35,7 @@ pub(super) fn prepare<'a>(
         names.iter().filter_map(|name| image.channel(name)).collect()
     };
     let (planes_a, planes_b) = (planes(a.image), planes(b.image));
-    let grid = Grid {
-        width: a.image.width(),
-        height: a.image.height(),
-    };
+    let grid = Grid { width: a.image.width(), height: a.image.height() };
     let finite = |i: usize| planes_a.iter().chain(&planes_b).all(|plane| plane[i].is_finite());
     let valid: Vec<bool> = (0..grid.pixels()).into_par_iter().map(finite).collect();
     let display = match is_colour {
@@ -48,15 +45,7 @@ pub(super) fn prepare<'a>(
         }),
         false => None,
     };
-    Ok(Prepared {
-        grid,
-        names,
-        a: planes_a,
-        b: planes_b,
-        valid,
-        display,
-        notes,
-    })
+    Ok(Prepared { grid, names, a: planes_a, b: planes_b, valid, display, notes })
 }
 
 fn check_sizes(a: Named<'_>, b: Named<'_>) -> Result<(), CompareError> {
@@ -105,18 +94,10 @@ fn common_channels(a: Named<'_>, b: Named<'_>) -> Result<(Vec<String>, bool, Vec
     }
     let mut notes = Vec::new();
     for named in [a, b] {
-        let left_out: Vec<&str> = named
-            .image
-            .channel_names()
-            .into_iter()
-            .filter(|name| !compared.contains(name))
-            .collect();
+        let left_out: Vec<&str> =
+            named.image.channel_names().into_iter().filter(|name| !compared.contains(name)).collect();
         if !left_out.is_empty() {
-            notes.push(format!(
-                "{}: channels not compared: {}",
-                named.name,
-                left_out.join(" ")
-            ));
+            notes.push(format!("{}: channels not compared: {}", named.name, left_out.join(" ")));
         }
     }
     let compared = compared.into_iter().map(String::from).collect();
@@ -130,16 +111,8 @@ fn encode(
 ) -> Result<Vec<Vec<f32>>, CompareError> {
     let encode_plane = |(channel, plane): (usize, &&[f32])| {
         let code = |(&radiance, &valid): (&f32, &bool)| {
-            let code = if valid {
-                display.code(channel, radiance)
-            } else {
-                0.0
-            };
-            if code.is_nan() {
-                Err(CompareError::Response { channel, radiance })
-            } else {
-                Ok(code)
-            }
+            let code = if valid { display.code(channel, radiance) } else { 0.0 };
+            if code.is_nan() { Err(CompareError::Response { channel, radiance }) } else { Ok(code) }
         };
         plane.par_iter().zip(valid).map(code).collect()
     };

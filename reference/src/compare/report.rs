@@ -15,7 +15,7 @@ pub struct Report {
     pub b: InputInfo,
     /// Channels that were compared.
     pub channels: Vec<String>,
-    /// True if every compared sample has the same bits' value in both (then PSNR, being infinite, is `null`).
+    /// True if every compared sample is equal in both and none is NaN; then PSNR, being infinite, is `null`.
     pub identical: bool,
     /// Radiance above which both images are clipped for `rmse_linear`; 1.0 = white. `null` for layers of data.
     pub clip_white: Option<f32>,
@@ -100,26 +100,14 @@ pub struct Figures {
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (label, input) in [("A", &self.a), ("B", &self.b)] {
-            let InputInfo {
-                name,
-                width_px,
-                height_px,
-                ..
-            } = input;
-            writeln!(
-                f,
-                "{label}  {name}  {width_px}x{height_px} px  {}",
-                input.channels.join(" ")
-            )?;
+            let InputInfo { name, width_px, height_px, .. } = input;
+            writeln!(f, "{label}  {name}  {width_px}x{height_px} px  {}", input.channels.join(" "))?;
         }
         let channels = self.channels.join(" ");
         match self.clip_white {
             Some(clip) => {
-                let (ev, encoding, ppd) = (
-                    self.exposure_ev,
-                    self.display_encoding,
-                    self.flip_pixels_per_degree,
-                );
+                let (ev, encoding, ppd) =
+                    (self.exposure_ev, self.display_encoding, self.flip_pixels_per_degree);
                 writeln!(
                     f,
                     "differences are A - B in {channels}; clip {clip} x white; \
@@ -134,11 +122,7 @@ impl fmt::Display for Report {
         }
         let mut columns = vec![("all", &self.all)];
         if let Some(sets) = &self.sets {
-            columns.extend([
-                ("real", &sets.real),
-                ("virtual", &sets.virtual_),
-                ("edge", &sets.edge),
-            ]);
+            columns.extend([("real", &sets.real), ("virtual", &sets.virtual_), ("edge", &sets.edge)]);
         }
         writeln!(f)?;
         write_table(f, &self.channels, &columns)?;
@@ -162,21 +146,15 @@ fn write_table(f: &mut fmt::Formatter<'_>, channels: &[String], columns: &[(&str
     };
     row("", &|name, _| name.into())?;
     row("pixels", &|_, figures| figures.pixels.to_string())?;
-    row("pixels excluded", &|_, figures| {
-        figures.pixels_excluded.to_string()
-    })?;
+    row("pixels excluded", &|_, figures| figures.pixels_excluded.to_string())?;
     row("RMSE linear, clipped", &|_, figures| cell(figures.rmse_linear))?;
-    row("RMSE linear, unclipped", &|_, figures| {
-        cell(figures.rmse_linear_unclipped)
-    })?;
+    row("RMSE linear, unclipped", &|_, figures| cell(figures.rmse_linear_unclipped))?;
     for channel in channels {
         row(&format!("mean difference {channel}"), &|_, figures| {
             cell(figures.mean_difference.get(channel).copied())
         })?;
     }
-    row("largest |difference|", &|_, figures| {
-        cell(figures.max_abs_difference)
-    })?;
+    row("largest |difference|", &|_, figures| cell(figures.max_abs_difference))?;
     row("RMSE display", &|_, figures| cell(figures.rmse_display))?;
     row("PSNR display (dB)", &|_, figures| cell(figures.psnr_db))?;
     row("PSNR linear (dB)", &|_, figures| cell(figures.psnr_linear_db))?;
@@ -187,7 +165,7 @@ fn write_table(f: &mut fmt::Formatter<'_>, channels: &[String], columns: &[(&str
 fn cell(figure: Option<f64>) -> String {
     match figure {
         None => "-".into(),
-        Some(value) if value == 0.0 => "0".into(),
+        Some(0.0) => "0".into(),
         Some(value) if (1e-3..1e5).contains(&value.abs()) => format!("{value:.5}"),
         Some(value) => format!("{value:.4e}"),
     }

@@ -50,10 +50,7 @@ impl CompareArgs {
 
     fn spec(&self, text: &str) -> ImageSpec {
         let spec = ImageSpec::parse(text);
-        ImageSpec {
-            layer: spec.layer.or_else(|| self.layer.clone()),
-            ..spec
-        }
+        ImageSpec { layer: spec.layer.or_else(|| self.layer.clone()), ..spec }
     }
 }
 
@@ -70,43 +67,23 @@ pub fn run(args: &CompareArgs) -> Result<Report, CompareError> {
 
     let (name_a, name_b) = (spec_a.to_string(), spec_b.to_string());
     let coverage_name = coverage_spec.map(|spec| spec.to_string()).unwrap_or_default();
-    let (a, b) = (
-        Named {
-            name: &name_a,
-            image: &image_a,
-        },
-        Named {
-            name: &name_b,
-            image: &image_b,
-        },
-    );
+    let (a, b) = (Named { name: &name_a, image: &image_a }, Named { name: &name_b, image: &image_b });
     let options = CompareOptions {
         clip_white: args.clip_white,
-        display: DisplayTransform {
-            exposure_ev: args.exposure_ev,
-            response: args.response.clone(),
-        },
-        coverage: coverage.as_ref().map(|(image, _)| Named {
-            name: &coverage_name,
-            image,
-        }),
+        display: DisplayTransform { exposure_ev: args.exposure_ev, response: args.response.clone() },
+        coverage: coverage.as_ref().map(|(image, _)| Named { name: &coverage_name, image }),
     };
     let comparison = compare(a, b, &options)?;
 
     if let Some(path) = &args.diff {
-        difference_picture(&comparison, args.diff_limit)?
-            .picture
-            .save(path)?;
+        difference_picture(&comparison, args.diff_limit)?.picture.save(path)?;
     }
     if let Some(path) = &args.flip {
         flip_picture(&comparison)?.save(path)?;
     }
     let mut report = comparison.report;
     let labelled = |label: &str, notes: Vec<String>| {
-        notes
-            .into_iter()
-            .map(|note| format!("{label}: {note}"))
-            .collect::<Vec<_>>()
+        notes.into_iter().map(|note| format!("{label}: {note}")).collect::<Vec<_>>()
     };
     report.notes.extend(labelled(&name_a, notes_a));
     report.notes.extend(labelled(&name_b, notes_b));

@@ -82,24 +82,14 @@ pub enum ImageError {
 
 impl ImageError {
     pub(crate) fn decode(path: &Path, part: &'static str, reason: impl ToString) -> Self {
-        Self::Decode {
-            path: path.into(),
-            part,
-            reason: reason.to_string(),
-        }
+        Self::Decode { path: path.into(), part, reason: reason.to_string() }
     }
 
     pub(crate) fn unsupported(path: &Path, what: impl Into<String>) -> Self {
-        Self::Unsupported {
-            path: path.into(),
-            what: what.into(),
-        }
+        Self::Unsupported { path: path.into(), what: what.into() }
     }
 
     pub(crate) fn write(path: &Path, reason: impl ToString) -> Self {
-        Self::Write {
-            path: path.into(),
-            reason: reason.to_string(),
-        }
+        Self::Write { path: path.into(), reason: reason.to_string() }
     }
 }

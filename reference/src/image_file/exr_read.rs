@@ -30,11 +30,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Lay
             display_origin_px: [display.position.0, display.position.1],
             display_size_px: [display.size.0, display.size.1],
         };
-        let name = part
-            .attributes
-            .layer_name
-            .map(|name| name.to_string())
-            .unwrap_or_default();
+        let name = part.attributes.layer_name.map(|name| name.to_string()).unwrap_or_default();
         let own_name = if parts > 1 { name.as_str() } else { "" };
         for (prefix, mut channels) in group_by_prefix(part.channel_data.list.into_vec(), &mut result.notes) {
             let layer = layer_name(&result, own_name, &prefix);
@@ -65,11 +61,7 @@ fn decode(path: &Path, bytes: &[u8]) -> Result<FlatImage, ImageError> {
     };
     match catch_unwind(decode) {
         Ok(result) => result.map_err(|error| ImageError::decode(path, PART, error)),
-        Err(_) => Err(ImageError::decode(
-            path,
-            PART,
-            "the decoder failed on its compressed pixels",
-        )),
+        Err(_) => Err(ImageError::decode(path, PART, "the decoder failed on its compressed pixels")),
     }
 }
 
@@ -104,11 +96,8 @@ fn check_headers(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<(), I
                 ));
             }
         }
-        let (width, height, channels) = (
-            header.layer_size.0,
-            header.layer_size.1,
-            header.channels.list.len(),
-        );
+        let (width, height, channels) =
+            (header.layer_size.0, header.layer_size.1, header.channels.list.len());
         total_bytes = total_bytes.saturating_add(limits.check(path, width, height, channels)?);
         if total_bytes > limits.max_decoded_bytes {
             return Err(ImageError::TooLarge {
@@ -134,10 +123,7 @@ fn group_by_prefix(
         let full_name = channel.name.to_string();
         let (prefix, name) = full_name.rsplit_once('.').unwrap_or(("", &full_name));
         let samples = floats(channel.sample_data, &full_name, notes);
-        let channel = Channel {
-            name: name.into(),
-            samples,
-        };
+        let channel = Channel { name: name.into(), samples };
         match groups.iter_mut().find(|(existing, _)| existing == prefix) {
             Some((_, members)) => members.push(channel),
             None => groups.push((prefix.into(), vec![channel])),
@@ -151,14 +137,10 @@ fn floats(samples: FlatSamples, name: &str, notes: &mut Vec<String>) -> Vec<f32>
         FlatSamples::F32(samples) => samples,
         FlatSamples::F16(samples) => samples.into_iter().map(|sample| sample.to_f32()).collect(),
         FlatSamples::U32(samples) => {
-            let rounded = samples
-                .iter()
-                .filter(|&&sample| (sample as f32) as u64 != u64::from(sample))
-                .count();
+            let rounded =
+                samples.iter().filter(|&&sample| (sample as f32) as u64 != u64::from(sample)).count();
             if rounded > 0 {
-                notes.push(format!(
-                    "channel {name}: {rounded} integers do not fit a float and are rounded"
-                ));
+                notes.push(format!("channel {name}: {rounded} integers do not fit a float and are rounded"));
             }
             samples.into_iter().map(|sample| sample as f32).collect()
         }

@@ -33,20 +33,14 @@ pub fn write_exr(
     precision: Precision,
 ) -> Result<(), ImageError> {
     let path = path.as_ref();
-    let first = file
-        .layers
-        .first()
-        .ok_or_else(|| ImageError::write(path, "there is no layer"))?;
+    let first = file.layers.first().ok_or_else(|| ImageError::write(path, "there is no layer"))?;
     let size = Vec2(first.image.width(), first.image.height());
     let mut channels = SmallVec::<[AnyChannel<FlatSamples>; 4]>::new();
     for layer in &file.layers {
         if Vec2(layer.image.width(), layer.image.height()) != size {
             let (a, b) = (&first.name, &layer.name);
             let (w, h) = (layer.image.width(), layer.image.height());
-            let reason = format!(
-                "layer {a:?} is {}x{} px and layer {b:?} {w}x{h} px",
-                size.0, size.1
-            );
+            let reason = format!("layer {a:?} is {}x{} px and layer {b:?} {w}x{h} px", size.0, size.1);
             return Err(ImageError::write(path, reason));
         }
         let is_data = layer.image.colour_kind() == ColourKind::Data;
@@ -75,20 +69,14 @@ pub fn write_exr(
     );
     let image = ExrImage::from_layer(layer);
     let mut encoded = Cursor::new(Vec::new());
-    let written = image
-        .write()
-        .non_parallel()
-        .to_buffered(BufWriter::new(&mut encoded));
+    let written = image.write().non_parallel().to_buffered(BufWriter::new(&mut encoded));
     written.map_err(|error| ImageError::write(path, error))?;
     std::fs::write(path, encoded.into_inner()).map_err(|error| ImageError::write(path, error))
 }
 
 fn to_half(path: &Path, name: &str, samples: &[f32]) -> Result<FlatSamples, ImageError> {
     let halves: Vec<f16> = samples.iter().map(|&sample| f16::from_f32(sample)).collect();
-    let overflow = halves
-        .iter()
-        .zip(samples)
-        .find(|(half, sample)| sample.is_finite() && !half.is_finite());
+    let overflow = halves.iter().zip(samples).find(|(half, sample)| sample.is_finite() && !half.is_finite());
     match overflow {
         Some((_, sample)) => Err(ImageError::write(
             path,

@@ -62,28 +62,19 @@ impl Image {
         let pixels = width.checked_mul(height).filter(|&count| count > 0);
         let (Some(pixels), false) = (pixels, channels.is_empty()) else {
             let count = channels.len();
-            return Err(ImageError::Shape(format!(
-                "{width}x{height} px with {count} channels"
-            )));
+            return Err(ImageError::Shape(format!("{width}x{height} px with {count} channels")));
         };
         for (index, channel) in channels.iter().enumerate() {
             let (name, length) = (&channel.name, channel.samples.len());
             if length != pixels {
                 let size = format!("{width}x{height} px = {pixels}");
-                return Err(ImageError::Shape(format!(
-                    "channel {name:?} has {length} samples, not {size}"
-                )));
+                return Err(ImageError::Shape(format!("channel {name:?} has {length} samples, not {size}")));
             }
             if channels.iter().take(index).any(|earlier| earlier.name == *name) {
                 return Err(ImageError::Shape(format!("channel {name:?} is there twice")));
             }
         }
-        Ok(Self {
-            width,
-            height,
-            channels,
-            window: None,
-        })
+        Ok(Self { width, height, channels, window: None })
     }
 
     /// A colour image from one linear RGB value per pixel, row by row.
@@ -112,14 +103,7 @@ impl Image {
         name: &str,
         samples: Vec<f32>,
     ) -> Result<Self, ImageError> {
-        Self::new(
-            width,
-            height,
-            vec![Channel {
-                name: name.into(),
-                samples,
-            }],
-        )
+        Self::new(width, height, vec![Channel { name: name.into(), samples }])
     }
 
     fn from_vectors(
@@ -129,10 +113,10 @@ impl Image {
         names: [&str; 3],
     ) -> Result<Self, ImageError> {
         let plane = |axis: usize| vectors.iter().map(|vector| vector[axis]).collect();
-        let channels = names.into_iter().enumerate().map(|(axis, name)| Channel {
-            name: name.into(),
-            samples: plane(axis),
-        });
+        let channels = names
+            .into_iter()
+            .enumerate()
+            .map(|(axis, name)| Channel { name: name.into(), samples: plane(axis) });
         Self::new(width, height, channels.collect())
     }
 
@@ -163,18 +147,12 @@ impl Image {
 
     /// The samples of a channel, by its exact name.
     pub fn channel(&self, name: &str) -> Option<&[f32]> {
-        self.channels
-            .iter()
-            .find(|channel| channel.name == name)
-            .map(|channel| channel.samples.as_slice())
+        self.channels.iter().find(|channel| channel.name == name).map(|channel| channel.samples.as_slice())
     }
 
     /// The names of all channels.
     pub fn channel_names(&self) -> Vec<&str> {
-        self.channels
-            .iter()
-            .map(|channel| channel.name.as_str())
-            .collect()
+        self.channels.iter().map(|channel| channel.name.as_str()).collect()
     }
 
     /// The planes `R`, `G`, `B`, if it has all three.
@@ -208,11 +186,7 @@ impl Image {
     /// The image with channels in the customary order: `R G B A`, then the others by name.
     pub(crate) fn sort_channels(channels: &mut [Channel]) {
         let rank = |name: &str| "RGBA".find(name).filter(|_| name.len() == 1).unwrap_or(4);
-        channels.sort_by(|a, b| {
-            rank(&a.name)
-                .cmp(&rank(&b.name))
-                .then_with(|| a.name.cmp(&b.name))
-        });
+        channels.sort_by(|a, b| rank(&a.name).cmp(&rank(&b.name)).then_with(|| a.name.cmp(&b.name)));
     }
 }
 
@@ -237,13 +211,7 @@ pub struct LayeredImage {
 impl LayeredImage {
     /// A file with one unnamed layer.
     pub fn single(image: Image) -> Self {
-        Self {
-            layers: vec![Layer {
-                name: String::new(),
-                image,
-            }],
-            notes: Vec::new(),
-        }
+        Self { layers: vec![Layer { name: String::new(), image }], notes: Vec::new() }
     }
 
     /// Adds a layer.
@@ -254,19 +222,13 @@ impl LayeredImage {
         if self.layer(name).is_some() {
             return Err(ImageError::Shape(format!("layer {name:?} is there twice")));
         }
-        self.layers.push(Layer {
-            name: name.into(),
-            image,
-        });
+        self.layers.push(Layer { name: name.into(), image });
         Ok(())
     }
 
     /// The layer of that exact name.
     pub fn layer(&self, name: &str) -> Option<&Image> {
-        self.layers
-            .iter()
-            .find(|layer| layer.name == name)
-            .map(|layer| &layer.image)
+        self.layers.iter().find(|layer| layer.name == name).map(|layer| &layer.image)
     }
 
     /// Adds a note for each layer that holds NaNs or infinities.
@@ -274,14 +236,10 @@ impl LayeredImage {
         for layer in &self.layers {
             let census = layer.image.census();
             if census.nan + census.infinite > 0 {
-                let place = if layer.name.is_empty() {
-                    "image".into()
-                } else {
-                    format!("layer {:?}", layer.name)
-                };
+                let place =
+                    if layer.name.is_empty() { "image".into() } else { format!("layer {:?}", layer.name) };
                 let (nan, infinite) = (census.nan, census.infinite);
-                self.notes
-                    .push(format!("{place}: {nan} NaN and {infinite} infinite samples kept"));
+                self.notes.push(format!("{place}: {nan} NaN and {infinite} infinite samples kept"));
             }
         }
     }

@@ -40,10 +40,7 @@ pub struct ReadLimits {
 impl Default for ReadLimits {
     /// 2 GiB: a 16384 × 8192 RGB environment map fits.
     fn default() -> Self {
-        Self {
-            max_decoded_bytes: 2 << 30,
-            max_side_px: 1 << 16,
-        }
+        Self { max_decoded_bytes: 2 << 30, max_side_px: 1 << 16 }
     }
 }
 
@@ -97,29 +94,21 @@ pub fn read(path: impl AsRef<Path>) -> Result<LayeredImage, ImageError> {
 /// As [`read`].
 pub fn read_with_limits(path: impl AsRef<Path>, limits: &ReadLimits) -> Result<LayeredImage, ImageError> {
     let path = path.as_ref();
-    let open = |source| ImageError::Open {
-        path: path.into(),
-        source,
-    };
+    let open = |source| ImageError::Open { path: path.into(), source };
     let about = std::fs::metadata(path).map_err(open)?;
     if !about.is_file() {
         return Err(ImageError::unsupported(path, "not a regular file"));
     }
     let too_long = || {
         let limit = limits.max_decoded_bytes;
-        ImageError::unsupported(
-            path,
-            format!("the file is longer than the read limit of {limit} bytes"),
-        )
+        ImageError::unsupported(path, format!("the file is longer than the read limit of {limit} bytes"))
     };
     if about.len() > limits.max_decoded_bytes {
         return Err(too_long());
     }
     let mut bytes = Vec::new();
     // The file may grow between the look and the read.
-    let mut file = File::open(path)
-        .map_err(open)?
-        .take(limits.max_decoded_bytes.saturating_add(1));
+    let mut file = File::open(path).map_err(open)?.take(limits.max_decoded_bytes.saturating_add(1));
     file.read_to_end(&mut bytes).map_err(open)?;
     if bytes.len() as u64 > limits.max_decoded_bytes {
         return Err(too_long());
@@ -133,10 +122,7 @@ pub fn read_with_limits(path: impl AsRef<Path>, limits: &ReadLimits) -> Result<L
 /// As [`read`].
 pub fn read_bytes(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<LayeredImage, ImageError> {
     match bytes {
-        [] => Err(ImageError::UnknownFormat {
-            path: path.into(),
-            found: "an empty file".into(),
-        }),
+        [] => Err(ImageError::UnknownFormat { path: path.into(), found: "an empty file".into() }),
         [0x76, 0x2f, 0x31, 0x01, ..] => exr_read::read(path, bytes, limits),
         [b'#', b'?', ..] => radiance::read(path, bytes, limits),
         [0x89, b'P', b'N', b'G', ..] => png_jpeg::read_png(path, bytes, limits),
@@ -144,10 +130,7 @@ pub fn read_bytes(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Laye
         _ => {
             let head: Vec<String> = bytes.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
             let found = format!("a file that begins with bytes {}", head.join(" "));
-            Err(ImageError::UnknownFormat {
-                path: path.into(),
-                found,
-            })
+            Err(ImageError::UnknownFormat { path: path.into(), found })
         }
     }
 }

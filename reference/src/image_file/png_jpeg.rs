@@ -51,9 +51,7 @@ fn decode(
     let mut picture = DynamicImage::from_decoder(decoder).map_err(broken)?;
     if orientation != Orientation::NoTransforms {
         picture.apply_orientation(orientation);
-        notes.push(format!(
-            "turned upright by its EXIF orientation ({orientation:?})"
-        ));
+        notes.push(format!("turned upright by its EXIF orientation ({orientation:?})"));
     }
     let mut file = LayeredImage::single(linearise(path, format, &picture)?);
     file.notes = notes;
@@ -67,34 +65,22 @@ fn linearise(path: &Path, format: &'static str, picture: &DynamicImage) -> Resul
         ColorType::Rgb8 | ColorType::Rgb16 => &["R", "G", "B"],
         ColorType::Rgba8 | ColorType::Rgba16 => &["R", "G", "B", "A"],
         other => {
-            return Err(ImageError::decode(
-                path,
-                format,
-                format!("pixel type {other:?} is not read"),
-            ));
+            return Err(ImageError::decode(path, format, format!("pixel type {other:?} is not read")));
         }
     };
-    let table: Vec<f32> = (0..=255u8)
-        .map(|code| srgb::decode(f64::from(code) / 255.0) as f32)
-        .collect();
+    let table: Vec<f32> = (0..=255u8).map(|code| srgb::decode(f64::from(code) / 255.0) as f32).collect();
     let plane = |index: usize, is_alpha: bool| -> Vec<f32> {
         let codes = |bytes: &[u8]| -> Vec<f32> {
             let mine = bytes.iter().skip(index).step_by(names.len()).copied();
             if is_alpha {
                 mine.map(|code| f32::from(code) / 255.0).collect()
             } else {
-                mine.map(|code| table.get(usize::from(code)).copied().unwrap_or(1.0))
-                    .collect()
+                mine.map(|code| table.get(usize::from(code)).copied().unwrap_or(1.0)).collect()
             }
         };
         let wide_codes = |words: &[u16]| -> Vec<f32> {
-            let mine = words
-                .iter()
-                .skip(index)
-                .step_by(names.len())
-                .map(|&code| f64::from(code) / 65535.0);
-            mine.map(|code| if is_alpha { code } else { srgb::decode(code) } as f32)
-                .collect()
+            let mine = words.iter().skip(index).step_by(names.len()).map(|&code| f64::from(code) / 65535.0);
+            mine.map(|code| if is_alpha { code } else { srgb::decode(code) } as f32).collect()
         };
         match picture {
             DynamicImage::ImageLuma16(wide) => wide_codes(wide),
@@ -104,15 +90,11 @@ fn linearise(path: &Path, format: &'static str, picture: &DynamicImage) -> Resul
             narrow => codes(narrow.as_bytes()),
         }
     };
-    let channels = names.iter().enumerate().map(|(index, &name)| Channel {
-        name: name.into(),
-        samples: plane(index, name == "A"),
-    });
-    Image::new(
-        picture.width() as usize,
-        picture.height() as usize,
-        channels.collect(),
-    )
+    let channels = names
+        .iter()
+        .enumerate()
+        .map(|(index, &name)| Channel { name: name.into(), samples: plane(index, name == "A") });
+    Image::new(picture.width() as usize, picture.height() as usize, channels.collect())
 }
 
 /// Bits per sample of a PNG.
@@ -136,26 +118,14 @@ pub fn write_png(path: impl AsRef<Path>, image: &Image, depth: BitDepth) -> Resu
         ColourKind::Grey => &["Y", "A"],
         ColourKind::Data => {
             let names = image.channel_names().join(" ");
-            return Err(ImageError::write(
-                path,
-                format!("a PNG holds R G B or Y, not {names}; write EXR"),
-            ));
+            return Err(ImageError::write(path, format!("a PNG holds R G B or Y, not {names}; write EXR")));
         }
     };
-    let planes: Vec<(bool, &[f32])> = names
-        .iter()
-        .filter_map(|name| Some((*name == "A", image.channel(name)?)))
-        .collect();
-    let nan = planes
-        .iter()
-        .flat_map(|(_, plane)| *plane)
-        .filter(|sample| sample.is_nan())
-        .count();
+    let planes: Vec<(bool, &[f32])> =
+        names.iter().filter_map(|name| Some((*name == "A", image.channel(name)?))).collect();
+    let nan = planes.iter().flat_map(|(_, plane)| *plane).filter(|sample| sample.is_nan()).count();
     if nan > 0 {
-        return Err(ImageError::write(
-            path,
-            format!("{nan} samples are NaN; write EXR to keep them"),
-        ));
+        return Err(ImageError::write(path, format!("{nan} samples are NaN; write EXR to keep them")));
     }
     let (colour_8, colour_16) = match planes.len() {
         1 => (ExtendedColorType::L8, ExtendedColorType::L16),
@@ -203,10 +173,7 @@ pub fn write_png_rgb8(
     let path = path.as_ref();
     if Some(rgb.len()) != width.checked_mul(height).and_then(|pixels| pixels.checked_mul(3)) {
         let got = rgb.len();
-        return Err(ImageError::write(
-            path,
-            format!("{got} bytes are not {width}x{height} px of 3"),
-        ));
+        return Err(ImageError::write(path, format!("{got} bytes are not {width}x{height} px of 3")));
     }
     save(path, rgb, width, height, ExtendedColorType::Rgb8)
 }

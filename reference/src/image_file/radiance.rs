@@ -29,23 +29,15 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Lay
         let start = y * width;
         for (axis, plane) in planes.iter_mut().enumerate() {
             let target = plane.iter_mut().skip(start).take(width);
-            let source: &mut dyn Iterator<Item = &[u8; 4]> = if raster.right_to_left {
-                &mut scanline.iter().rev()
-            } else {
-                &mut scanline.iter()
-            };
+            let source: &mut dyn Iterator<Item = &[u8; 4]> =
+                if raster.right_to_left { &mut scanline.iter().rev() } else { &mut scanline.iter() };
             for (sample, pixel) in target.zip(source) {
                 *sample = f32::from(pixel[axis]) * exponent_scale(pixel[3]);
             }
         }
     }
     let channels = ["R", "G", "B"].into_iter().zip(planes);
-    let channels = channels
-        .map(|(name, samples)| Channel {
-            name: name.into(),
-            samples,
-        })
-        .collect();
+    let channels = channels.map(|(name, samples)| Channel { name: name.into(), samples }).collect();
     let mut file = LayeredImage::single(Image::new(width, height, channels)?);
     file.notes = notes;
     Ok(file)
@@ -53,11 +45,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Lay
 
 /// 2^(e − 136), and 0 for e = 0. Subnormal below e = 10, but exact: 2^-135 is a multiple of the least `f32`.
 fn exponent_scale(exponent: u8) -> f32 {
-    if exponent == 0 {
-        0.0
-    } else {
-        2f64.powi(i32::from(exponent) - 136) as f32
-    }
+    if exponent == 0 { 0.0 } else { 2f64.powi(i32::from(exponent) - 136) as f32 }
 }
 
 struct Raster {
@@ -96,10 +84,7 @@ impl<'a> Reader<'a> {
             if line.is_empty() {
                 return Ok(notes);
             }
-            match line
-                .split_once('=')
-                .map(|(key, value)| (key.trim(), value.trim()))
-            {
+            match line.split_once('=').map(|(key, value)| (key.trim(), value.trim())) {
                 Some(("FORMAT", "32-bit_rle_rgbe")) => {}
                 Some(("FORMAT", other)) => {
                     let what = format!(
@@ -185,11 +170,8 @@ impl<'a> Reader<'a> {
         let mut filled = 0;
         while filled < scanline.len() {
             let count = usize::from(self.take(1, row)?.first().copied().unwrap_or(0));
-            let (length, bytes) = if count > 128 {
-                (count - 128, self.take(1, row)?)
-            } else {
-                (count, self.take(count, row)?)
-            };
+            let (length, bytes) =
+                if count > 128 { (count - 128, self.take(1, row)?) } else { (count, self.take(count, row)?) };
             let target = scanline
                 .get_mut(filled..filled + length)
                 .filter(|_| length > 0)
@@ -212,11 +194,7 @@ impl<'a> Reader<'a> {
             let pixel = self.pixel(row)?;
             let (value, length) = match (pixel, last) {
                 ([1, 1, 1, count], Some(previous)) => {
-                    let length = if shift < 32 {
-                        usize::from(count) << shift
-                    } else {
-                        usize::MAX
-                    };
+                    let length = if shift < 32 { usize::from(count) << shift } else { usize::MAX };
                     shift += 8;
                     (previous, length)
                 }
@@ -264,10 +242,7 @@ mod tests {
     #[test]
     fn column_orientation_is_refused_by_name() {
         let message = decode("+X 2 -Y 2", &PIXELS).unwrap_err().to_string();
-        assert!(
-            message.contains("+X 2 -Y 2") && message.contains("t.hdr"),
-            "{message}"
-        );
+        assert!(message.contains("+X 2 -Y 2") && message.contains("t.hdr"), "{message}");
     }
 
     #[test]
@@ -289,10 +264,7 @@ mod tests {
         let mut data = vec![2, 2, 0, 8];
         data.extend([3, 1, 2, 3, 128 + 5, 9]); // red: 1 2 3 9 9 9 9 9
         data.extend([128 + 8, 0, 128 + 8, 0, 128 + 8, 136]);
-        assert_eq!(
-            red(&decode("-Y 1 +X 8", &data).unwrap()),
-            [1.0, 2.0, 3.0, 9.0, 9.0, 9.0, 9.0, 9.0]
-        );
+        assert_eq!(red(&decode("-Y 1 +X 8", &data).unwrap()), [1.0, 2.0, 3.0, 9.0, 9.0, 9.0, 9.0, 9.0]);
     }
 
     #[test]

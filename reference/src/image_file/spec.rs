@@ -17,14 +17,10 @@ impl ImageSpec {
     pub fn parse(text: &str) -> Self {
         let whole = Path::new(text);
         match text.rsplit_once('#') {
-            Some((path, layer)) if !path.is_empty() && !layer.is_empty() && !whole.exists() => Self {
-                path: path.into(),
-                layer: Some(layer.into()),
-            },
-            _ => Self {
-                path: whole.into(),
-                layer: None,
-            },
+            Some((path, layer)) if !path.is_empty() && !layer.is_empty() && !whole.exists() => {
+                Self { path: path.into(), layer: Some(layer.into()) }
+            }
+            _ => Self { path: whole.into(), layer: None },
         }
     }
 
@@ -51,19 +47,11 @@ impl ImageSpec {
 
     fn no_layer(&self, file: &LayeredImage, problem: String) -> ImageError {
         let describe = |layer: &super::Layer| {
-            let name = if layer.name.is_empty() {
-                "(unnamed)"
-            } else {
-                &layer.name
-            };
+            let name = if layer.name.is_empty() { "(unnamed)" } else { &layer.name };
             format!("{name} [{}]", layer.image.channel_names().join(" "))
         };
         let available = file.layers.iter().map(describe).collect::<Vec<_>>().join(", ");
-        ImageError::Layer {
-            path: self.path.clone(),
-            problem,
-            available,
-        }
+        ImageError::Layer { path: self.path.clone(), problem, available }
     }
 }
 

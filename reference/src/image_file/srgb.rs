@@ -2,20 +2,12 @@
 
 /// Code value (0 to 1) to linear radiance. Values beyond [0, 1] follow the same curve; negative ones its toe.
 pub fn decode(code: f64) -> f64 {
-    if code <= 0.04045 {
-        code / 12.92
-    } else {
-        ((code + 0.055) / 1.055).powf(2.4)
-    }
+    if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
 }
 
 /// Linear radiance to code value (0 to 1 for input of 0 to 1). The inverse of [`decode`].
 pub fn encode(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 {
-        linear * 12.92
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    }
+    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
 /// [`encode`] of a value clipped to [0, 1], as an integer code of `0..=max_code`, rounded to nearest.
