@@ -8,9 +8,7 @@ use coshade_reference::compare::{CompareArgs, run};
 fn main() -> Result<(), Box<dyn Error>> {
     let mut files = Vec::new();
     let (mut diff, mut flip) = (None, None);
-    let mut words = std::env::args()
-        .skip(1)
-        .filter(|word| word != "compare" && word != "--json");
+    let mut words = std::env::args().skip(1).filter(|word| word != "compare" && word != "--json");
     while let Some(word) = words.next() {
         match word.as_str() {
             "--diff" => diff = words.next(),
