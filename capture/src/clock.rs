@@ -6,7 +6,9 @@ use std::time::{Duration, Instant};
 /// A moment on the session's monotonic clock, in nanoseconds.
 ///
 /// Live devices map their own stamps to this clock; recordings keep the stamps they were made with.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize,
+)]
 #[serde(transparent)]
 pub struct Timestamp(u64);
 

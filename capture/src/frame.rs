@@ -172,7 +172,14 @@ impl Frame {
         };
         let found_bytes = self.pixels.len();
         if (found_bytes as u64) < needed_bytes {
-            return Err(FrameError::TooShort { format, width_px, height_px, stride_bytes, needed_bytes, found_bytes });
+            return Err(FrameError::TooShort {
+                format,
+                width_px,
+                height_px,
+                stride_bytes,
+                needed_bytes,
+                found_bytes,
+            });
         }
         Ok(())
     }

@@ -8,9 +8,11 @@ pub mod clock;
 pub mod control;
 pub mod convert;
 pub mod frame;
+pub mod images;
 pub mod latest;
 pub mod pixel_format;
 pub mod pool;
+pub mod registry;
 
 pub use camera::{Camera, CaptureError, StreamInfo};
 pub use clock::Timestamp;
@@ -20,3 +22,4 @@ pub use frame::{DepthFrame, Frame, FrameError};
 pub use latest::{LatestError, LatestReceiver, LatestSender, latest};
 pub use pixel_format::{ColorEncoding, PixelFormat, YuvMatrix, YuvRange};
 pub use pool::{FramePool, PixelBuffer, PixelBufferMut};
+pub use registry::{SourceRegistry, open};

@@ -89,6 +89,12 @@ impl Drop for Storage {
 pub struct PixelBufferMut(Storage);
 
 impl PixelBufferMut {
+    /// A buffer that belongs to no pool.
+    pub fn from_vec(bytes: Vec<u8>) -> Self {
+        let len = bytes.len();
+        Self(Storage { bytes, len, home: None })
+    }
+
     /// Shortens the buffer to `len` bytes; no effect if it is not longer.
     pub fn truncate(&mut self, len: usize) {
         self.0.len = self.0.len.min(len);
@@ -128,8 +134,7 @@ pub struct PixelBuffer(Arc<Storage>);
 impl PixelBuffer {
     /// A buffer that belongs to no pool, for sources that have none.
     pub fn from_vec(bytes: Vec<u8>) -> Self {
-        let len = bytes.len();
-        Self(Arc::new(Storage { bytes, len, home: None }))
+        PixelBufferMut::from_vec(bytes).freeze()
     }
 }
 

@@ -67,6 +67,30 @@ pub struct JpegHeader {
     end: usize,
 }
 
+/// Width, height and number of channels from the first bytes of an image, as far as its frame header.
+///
+/// # Errors
+/// [`JpegError`], [`JpegError::Truncated`] if the frame header comes later.
+pub fn image_size(bytes: &[u8]) -> Result<[u32; 3], JpegError> {
+    if !bytes.starts_with(&[0xFF, 0xD8]) {
+        return Err(JpegError::NotJpeg);
+    }
+    let mut at = 2;
+    loop {
+        let (marker, marker_at) = next_marker(bytes, at)?;
+        at = marker_at + 2;
+        if matches!(marker, 0x01 | 0xD0..=0xD7) {
+            continue;
+        }
+        let segment = segment(bytes, at)?;
+        match marker {
+            0xC0..=0xC2 => return frame_header(segment, marker_at),
+            0xD9 | 0xDA => return Err(damaged(marker_at, "image data before the frame header")),
+            _ => at += 2 + segment.len(),
+        }
+    }
+}
+
 impl JpegHeader {
     /// Reads all headers and finds the end of the image; does not decode it.
     ///
@@ -101,7 +125,8 @@ impl JpegHeader {
                 at = end_of_scan(bytes, at).ok_or(JpegError::Truncated(bytes.len()))?;
             }
         }
-        let [width_px, height_px, channels] = size.ok_or_else(|| damaged(at, "it ends without a frame header"))?;
+        let [width_px, height_px, channels] =
+            size.ok_or_else(|| damaged(at, "it ends without a frame header"))?;
         let scan_at = scan_at.ok_or_else(|| damaged(at, "it ends without image data"))?;
         check_plausible(width_px, height_px, scan_at, at)?;
         Ok(Self { width_px, height_px, channels, has_huffman_tables, scan_at, end: at })
@@ -125,7 +150,9 @@ fn next_marker(bytes: &[u8], at: usize) -> Result<(u8, usize), JpegError> {
 /// The content of the segment whose length field is at `at`.
 fn segment(bytes: &[u8], at: usize) -> Result<&[u8], JpegError> {
     let truncated = JpegError::Truncated(bytes.len());
-    let Some(&[high, low]) = bytes.get(at..at + 2) else { return Err(truncated) };
+    let Some(&[high, low]) = bytes.get(at..at + 2) else {
+        return Err(truncated);
+    };
     let len = usize::from(u16::from_be_bytes([high, low]));
     if len < 2 {
         return Err(damaged(at, "a segment shorter than its own length field"));
@@ -169,7 +196,8 @@ fn end_of_scan(bytes: &[u8], mut at: usize) -> Option<usize> {
 fn check_plausible(width_px: u32, height_px: u32, scan_at: usize, end: usize) -> Result<(), JpegError> {
     let blocks = width_px.div_ceil(8) as usize * height_px.div_ceil(8) as usize;
     if (end - scan_at) * 8 < blocks {
-        let reason = format!("{} bytes of image data are too few for {width_px} x {height_px} pixels", end - scan_at);
+        let reason =
+            format!("{} bytes of image data are too few for {width_px} x {height_px} pixels", end - scan_at);
         return Err(JpegError::Damaged { at: scan_at, reason });
     }
     Ok(())
@@ -191,7 +219,12 @@ pub(super) struct Decoder {
 
 impl Decoder {
     /// Decodes the image of a checked MJPG frame to `out`, whose length fits frame and channels.
-    pub(super) fn decode(&mut self, frame: &Frame, channels: Channels, out: &mut [u8]) -> Result<(), JpegError> {
+    pub(super) fn decode(
+        &mut self,
+        frame: &Frame,
+        channels: Channels,
+        out: &mut [u8],
+    ) -> Result<(), JpegError> {
         let header = JpegHeader::read(&frame.pixels)?;
         let image_px = [header.width_px, header.height_px];
         let frame_px = [frame.width_px, frame.height_px];

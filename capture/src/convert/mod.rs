@@ -217,7 +217,7 @@ fn codes_16(row: &[u8]) -> impl Iterator<Item = u16> + '_ {
 }
 
 /// 65535 → 255, rounded to nearest (257 is odd: there are no halves).
-fn high_8(code: u16) -> u8 {
+pub(crate) fn high_8(code: u16) -> u8 {
     ((u32::from(code) + 128) / 257) as u8
 }
 

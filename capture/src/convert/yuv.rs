@@ -64,7 +64,9 @@ impl YuvRows {
             ChromaUpsampling::Linear => other,
             ChromaUpsampling::Nearest => near,
         };
-        let (Some(near), Some(far)) = (frame.chroma_row(near), frame.chroma_row(far)) else { return };
+        let (Some(near), Some(far)) = (frame.chroma_row(near), frame.chroma_row(far)) else {
+            return;
+        };
         let pairs = near.as_chunks::<2>().0.iter().zip(far.as_chunks::<2>().0);
         for ((near, far), (cb, cr)) in pairs.zip(self.half_cb.iter_mut().zip(&mut self.half_cr)) {
             // Quarters of bytes are exact in floating point: nothing is rounded here.
