@@ -17,14 +17,15 @@
 //! the determinant over the direction of q shows that
 //!
 //! ```text
-//! h'(r) > 6 r |q|   and   g(r²) > 10/3 r |q|   and   M(r²) > 0
+//! h'(r) > 6 r |q|   and   g(r²) > 10/3 r |q|
 //! ```
 //!
 //! suffice. The first is also necessary: in the direction opposite to q the image turns back where it fails. (The
-//! second can only bind first within a factor 10/9 of the first, since g is the mean of h' over [0, r].) So **the
-//! cone is the largest disc r < r_max in which all three hold** with the margin of `MIN_SLOPE`; it ends at the
-//! radial polynomial's first turning point or pole, or before it where tangential terms tilt the image over.
-//! Points further off the axis are not projected although the formula gives numbers: those pixels belong to other rays.
+//! second can only bind first within a factor 10/9 of the first, since g is the mean of h' over [0, r].) Written as
+//! N M > 10/3 r |q| M², the second also ends the disc at the first pole. So **the cone is the largest disc r < r_max
+//! in which both hold** with the margin of `MIN_SLOPE`; it ends at the radial function's first turning point or pole,
+//! or before it where tangential terms tilt the image over. Points further off the axis are not projected although
+//! the formula gives numbers: those pixels belong to other rays.
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -216,8 +217,8 @@ fn with_one(c: [f64; 3]) -> [f64; 4] {
     [1.0, c[0], c[1], c[2]]
 }
 
-/// The radius up to which the three conditions of the module's documentation hold, each times a power of M (and thus
-/// a polynomial in r), and each with the margin `MIN_SLOPE` of the sum of the magnitudes of its terms.
+/// The radius up to which the two conditions of the module's documentation hold, each times M² (and thus a polynomial
+/// in r), and each with the margin `MIN_SLOPE` of the sum of the magnitudes of its terms.
 fn max_radius(n: &[f64], m: &[f64], q: f64) -> f64 {
     let (size_n, size_m) = (poly::magnitude(n), poly::magnitude(m));
     // h' M² = (N + 2 s N') M − 2 s N M'
@@ -230,7 +231,6 @@ fn max_radius(n: &[f64], m: &[f64], q: f64) -> f64 {
     let size_slope = poly::sum(&size_nm, 1.0, &poly::twice_s_derivative(&size_nm));
 
     let conditions = [
-        (poly::of_square(m), poly::of_square(&size_m)),
         (less_tangential(&slope, m, 6.0 * q), less_tangential(&size_slope, &size_m, -6.0 * q)),
         (less_tangential(&nm, m, 10.0 / 3.0 * q), less_tangential(&size_nm, &size_m, -10.0 / 3.0 * q)),
     ];
