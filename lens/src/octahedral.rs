@@ -36,18 +36,11 @@ pub fn uv_from_direction(direction: &Vector3<f64>) -> Option<Uv> {
     if d.z < 0.0 {
         (s, t) = (1.0 - t, 1.0 - s);
     }
-    Some(Uv::new(
-        (1.0 + s.copysign(d.x)) / 2.0,
-        (1.0 + t.copysign(d.y)) / 2.0,
-    ))
+    Some(Uv::new((1.0 + s.copysign(d.x)) / 2.0, (1.0 + t.copysign(d.y)) / 2.0))
 }
 
 fn angle(opposite: f64, adjacent: f64) -> f64 {
-    if opposite == 0.0 {
-        0.0
-    } else {
-        opposite.atan2(adjacent)
-    }
+    if opposite == 0.0 { 0.0 } else { opposite.atan2(adjacent) }
 }
 
 /// The unit direction of a place in the square. Places outside [0,1]² are first brought back over the fold
@@ -57,11 +50,7 @@ pub fn direction_from_uv(uv: Uv) -> Vector3<f64> {
     let (s, t) = (square.x.abs(), square.y.abs());
     let distance_from_horizon = 1.0 - (s + t);
     // On the lower half the square's corner plays the part of the centre, with the axes swapped.
-    let (a, b) = if distance_from_horizon < 0.0 {
-        (1.0 - t, 1.0 - s)
-    } else {
-        (s, t)
-    };
+    let (a, b) = if distance_from_horizon < 0.0 { (1.0 - t, 1.0 - s) } else { (s, t) };
     let r = a + b;
     let (sin_phi, cos_phi) = if r <= 0.0 {
         (0.0, 1.0)
@@ -73,11 +62,7 @@ pub fn direction_from_uv(uv: Uv) -> Vector3<f64> {
     };
     let z = (1.0 - r * r).copysign(distance_from_horizon);
     let sin_theta = r * (2.0 - r * r).max(0.0).sqrt();
-    Vector3::new(
-        (sin_theta * cos_phi).copysign(square.x),
-        (sin_theta * sin_phi).copysign(square.y),
-        z,
-    )
+    Vector3::new((sin_theta * cos_phi).copysign(square.x), (sin_theta * sin_phi).copysign(square.y), z)
 }
 
 /// Brings a point of the tiled plane, in coordinates where the square is [−1,1]², back into the square: half
@@ -90,11 +75,7 @@ pub fn fold(square: Vector2<f64>) -> Vector2<f64> {
     let tile_x = ((square.x + 1.0) / 2.0).floor();
     let tile_y = ((square.y + 1.0) / 2.0).floor();
     let local = Vector2::new(square.x - 2.0 * tile_x, square.y - 2.0 * tile_y);
-    if (tile_x + tile_y).rem_euclid(2.0) == 0.0 {
-        local
-    } else {
-        -local
-    }
+    if (tile_x + tile_y).rem_euclid(2.0) == 0.0 { local } else { -local }
 }
 
 /// The texel that lies at index (x, y) of the tiled plane: the index itself inside an n×n map (n > 0), and the
@@ -217,10 +198,7 @@ mod tests {
             ] {
                 let (x, y) = fold_texel(outside.0, outside.1, n);
                 let angle = texel_direction(x, y, n).angle(&texel_direction(inside.0, inside.1, n));
-                assert!(
-                    angle < 2.0 * texel_solid_angle_sr(n).sqrt(),
-                    "{outside:?}: {angle}"
-                );
+                assert!(angle < 2.0 * texel_solid_angle_sr(n).sqrt(), "{outside:?}: {angle}");
                 let continued = direction_from_uv(Uv::new(
                     (outside.0 as f64 + 0.5) / f64::from(n),
                     (outside.1 as f64 + 0.5) / f64::from(n),

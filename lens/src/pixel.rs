@@ -3,7 +3,7 @@
 //! | type | pixel (0,0) | used by |
 //! | --- | --- | --- |
 //! | [`CameraPx`] | centre at (0, 0) | our camera models, OpenCV, Kalibr |
-//! | [`RasterPx`] | covers [0, 1)², centre at (½, ½) | our rasters and textures, AprilTag's C library, COLMAP, Mitsuba's film |
+//! | [`RasterPx`] | covers [0, 1)², centre at (½, ½) | our rasters and textures, AprilTag, COLMAP, Mitsuba's film |
 //! | [`Uv`] | `RasterPx` ÷ image size, in [0, 1]² | texture look-ups |
 //! | [`Ndc`] | wgpu's clip square [−1, 1]², y up | vertex shaders |
 //!
@@ -20,7 +20,7 @@ pub struct CameraPx(pub Vector2<f64>);
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RasterPx(pub Vector2<f64>);
 
-/// A texture coordinate: [0,1]² over the whole image, (0,0) at the outer corner of pixel (0,0).
+/// A texture coordinate: 0 to 1 over the whole image, (0,0) at the outer corner of pixel (0,0).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Uv(pub Vector2<f64>);
 
@@ -135,9 +135,7 @@ impl Ndc {
 
     /// The same point in camera coordinates of an image of `size_px`.
     pub fn to_camera(self, size_px: [u32; 2]) -> CameraPx {
-        Uv::new((self.0.x + 1.0) / 2.0, (1.0 - self.0.y) / 2.0)
-            .to_raster(size_px)
-            .to_camera()
+        Uv::new((self.0.x + 1.0) / 2.0, (1.0 - self.0.y) / 2.0).to_raster(size_px).to_camera()
     }
 }
 
@@ -170,10 +168,7 @@ mod tests {
         let center = CameraPx::new(0.0, 0.0);
         assert_eq!(center.to_raster(), RasterPx::center_of(0, 0));
         assert_eq!(center.to_uv(SIZE), Uv::new(0.5 / 640.0, 0.5 / 480.0));
-        assert_eq!(
-            center.to_ndc(SIZE),
-            Ndc::new(1.0 / 640.0 - 1.0, 1.0 - 1.0 / 480.0)
-        );
+        assert_eq!(center.to_ndc(SIZE), Ndc::new(1.0 / 640.0 - 1.0, 1.0 - 1.0 / 480.0));
         assert_eq!(center.to_apriltag(), Vector2::new(0.5, 0.5));
         assert_eq!(center.to_colmap(), Vector2::new(0.5, 0.5));
         assert_eq!(center.to_mitsuba_film(), Vector2::new(0.5, 0.5));
@@ -203,10 +198,7 @@ mod tests {
         let half = Vector2::new(0.5, 0.5);
         assert_eq!(CameraPx::new(0.5, 0.5).scaled(half), CameraPx::new(0.0, 0.0));
         assert_eq!(CameraPx::new(-0.5, -0.5).scaled(half), CameraPx::new(-0.5, -0.5));
-        assert_eq!(
-            CameraPx::new(639.5, 479.5).scaled(half),
-            CameraPx::new(319.5, 239.5)
-        );
+        assert_eq!(CameraPx::new(639.5, 479.5).scaled(half), CameraPx::new(319.5, 239.5));
     }
 
     #[test]

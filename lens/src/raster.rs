@@ -7,6 +7,7 @@
 use nalgebra::{Rotation3, Vector2, Vector3};
 use rayon::prelude::*;
 
+use crate::calibration_mistake::Mistake;
 use crate::octahedral;
 use crate::pixel::RasterPx;
 pub use crate::raster_camera::{CameraRaster, ImageCircle};
@@ -15,6 +16,9 @@ pub use crate::raster_sphere::{LatLongRaster, OctahedralRaster};
 
 /// The largest width or height of a raster, in pixels.
 pub const MAX_SIDE_PX: u32 = 16384;
+
+/// Rows that one task works off; neighbouring rows share their corners.
+const BAND_ROWS: u32 = 16;
 
 /// Why a raster cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -29,6 +33,9 @@ pub enum RasterError {
         /// Height in pixels.
         height: u32,
     },
+    /// The image circle is not allowed.
+    #[error("image circle: {0}")]
+    Circle(Mistake),
     /// A parameter is out of its range or not a number.
     #[error("{name} = {value} is not allowed: {allowed}")]
     Parameter {
@@ -43,11 +50,7 @@ pub enum RasterError {
 
 pub(crate) fn check_size([width, height]: [u32; 2]) -> Result<(), RasterError> {
     let fits = |side| (1..=MAX_SIDE_PX).contains(&side);
-    if fits(width) && fits(height) {
-        Ok(())
-    } else {
-        Err(RasterError::Size { width, height })
-    }
+    if fits(width) && fits(height) { Ok(()) } else { Err(RasterError::Size { width, height }) }
 }
 
 pub(crate) fn check_rotation(rotation: &Rotation3<f64>) -> Result<(), RasterError> {
@@ -139,10 +142,14 @@ impl Raster {
         let [width, height] = self.size_px();
         let rows = (0..height).into_par_iter();
         match self {
-            Self::Camera(raster) => rows.flat_map_iter(|y| raster.row_solid_angles_sr(y)).collect(),
-            Self::Pinhole(raster) => rows
-                .flat_map_iter(|y| (0..width).map(move |x| raster.pixel_solid_angle_sr(x, y)))
-                .collect(),
+            Self::Camera(raster) => {
+                let bands = (0..height.div_ceil(BAND_ROWS)).into_par_iter().map(|band| band * BAND_ROWS);
+                let end = |start: u32| (start + BAND_ROWS).min(height);
+                bands.flat_map_iter(|start| raster.rows_solid_angles_sr(start..end(start))).collect()
+            }
+            Self::Pinhole(raster) => {
+                rows.flat_map_iter(|y| (0..width).map(move |x| raster.pixel_solid_angle_sr(x, y))).collect()
+            }
             Self::Octahedral(raster) => {
                 let texel_sr = octahedral::texel_solid_angle_sr(raster.side_px());
                 vec![texel_sr; width as usize * height as usize]
@@ -173,10 +180,9 @@ impl Raster {
     pub(crate) fn pixel_index(&self, x: i64, y: i64) -> u32 {
         let [width, height] = self.size_px();
         let (x, y) = match self {
-            Self::Camera(_) | Self::Pinhole(_) => (
-                x.clamp(0, i64::from(width) - 1) as u32,
-                y.clamp(0, i64::from(height) - 1) as u32,
-            ),
+            Self::Camera(_) | Self::Pinhole(_) => {
+                (x.clamp(0, i64::from(width) - 1) as u32, y.clamp(0, i64::from(height) - 1) as u32)
+            }
             Self::Octahedral(_) => octahedral::fold_texel(x, y, width),
             Self::LatLong(raster) => raster.wrapped(x, y),
         };

@@ -4,6 +4,7 @@ use nalgebra::{Rotation3, Vector2, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::calibration_mistake::Mistake;
 use crate::model::CameraModel;
 use crate::pixel::{CameraPx, RasterPx};
 use crate::raster::{RasterError, check_rotation, check_size, quad_solid_angle_sr};
@@ -25,25 +26,26 @@ pub struct ImageCircle {
     pub max_angle_deg: Option<f64>,
 }
 
+const CIRCLE: &str = "center_px and radius_px together, or neither";
+
 impl ImageCircle {
-    /// The first mistake as (key, what is allowed), or `None`.
-    pub fn mistake(&self) -> Option<(&'static str, &'static str)> {
-        let bad_center = |c: &[f64; 2]| !c.iter().all(|c| c.abs() < 1e6);
+    /// The first mistake, or `None`.
+    pub fn mistake(&self) -> Option<Mistake> {
+        let out_of_range =
+            |key, value, allowed| Some(Mistake::new(&[key], format!("`{value}` is out of range"), allowed));
         match (self.center_px, self.radius_px) {
-            (None, Some(_)) => return Some(("center_px", "radius_px needs center_px beside it")),
-            (Some(_), None) => return Some(("radius_px", "center_px needs radius_px beside it")),
+            (None, Some(_)) => return Some(Mistake::new(&["center_px"], "missing".to_owned(), CIRCLE)),
+            (Some(_), None) => return Some(Mistake::new(&["radius_px"], "missing".to_owned(), CIRCLE)),
             _ => {}
         }
-        if self.center_px.as_ref().is_some_and(bad_center) {
-            return Some(("center_px", "must be two numbers between −1e6 and 1e6"));
+        if let Some(center) = self.center_px.filter(|center| !center.iter().all(|c| c.abs() < 1e6)) {
+            return out_of_range("center_px", format!("{center:?}"), "two numbers between −1e6 and 1e6");
         }
-        if self.radius_px.is_some_and(|r| !(r > 0.0 && r < 1e6)) {
-            return Some(("radius_px", "must be more than 0 and less than 1e6"));
+        if let Some(radius) = self.radius_px.filter(|radius| !(*radius > 0.0 && *radius < 1e6)) {
+            return out_of_range("radius_px", radius.to_string(), "more than 0 and less than 1e6");
         }
-        if self.max_angle_deg.is_some_and(|a| !(a > 0.0 && a <= 180.0)) {
-            return Some(("max_angle_deg", "must be more than 0 and at most 180"));
-        }
-        None
+        let angle = self.max_angle_deg.filter(|angle| !(*angle > 0.0 && *angle <= 180.0))?;
+        out_of_range("max_angle_deg", angle.to_string(), "more than 0 and at most 180")
     }
 
     /// Whether a position in camera coordinates, seen `angle_rad` off the axis, is inside.
@@ -85,19 +87,10 @@ impl CameraRaster {
     ) -> Result<Self, RasterError> {
         check_size(size_px)?;
         check_rotation(&camera_from_frame)?;
-        if let Some((name, allowed)) = circle.mistake() {
-            return Err(RasterError::Parameter {
-                name,
-                value: format!("{circle:?}"),
-                allowed,
-            });
+        if let Some(mistake) = circle.mistake() {
+            return Err(RasterError::Circle(mistake));
         }
-        Ok(Self {
-            model,
-            size_px,
-            circle,
-            camera_from_frame,
-        })
+        Ok(Self { model, size_px, circle, camera_from_frame })
     }
 
     /// Width and height in pixels.
@@ -123,29 +116,31 @@ impl CameraRaster {
         (bounded && self.circle.contains(camera_px, off_axis_rad(&ray))).then(|| camera_px.to_raster())
     }
 
-    /// The solid angles of the pixels of row `y` in steradian; 0 where one of the corners has no direction.
-    pub(crate) fn row_solid_angles_sr(&self, y: u32) -> Vec<f64> {
+    /// The solid angles of the pixels of some rows in steradian; 0 where one of the corners has no direction.
+    pub(crate) fn rows_solid_angles_sr(&self, rows: std::ops::Range<u32>) -> Vec<f64> {
         let corner = |x: u32, y: u32| self.direction(RasterPx::new(f64::from(x), f64::from(y)));
-        let row = |y: u32| {
-            (0..=self.size_px[0])
-                .map(move |x| corner(x, y))
-                .collect::<Vec<_>>()
-        };
-        let (top, bottom) = (row(y), row(y + 1));
-        (0..self.size_px[0])
-            .zip(top.windows(2).zip(bottom.windows(2)))
-            .map(|(x, (top, bottom))| match (top, bottom) {
-                ([Some(a), Some(b)], [Some(d), Some(c)]) => {
-                    let longest = (a - c).norm().max((b - d).norm());
-                    if longest < STRAIGHT_RAD {
-                        quad_solid_angle_sr([a, b, c, d])
-                    } else {
-                        self.divided_solid_angle_sr(x, y, (longest / STRAIGHT_RAD).ceil())
-                    }
-                }
+        let corners = |y: u32| (0..=self.size_px[0]).map(|x| corner(x, y)).collect::<Vec<_>>();
+        let mut solid_angles = Vec::with_capacity(self.size_px[0] as usize * rows.len());
+        let mut top = corners(rows.start);
+        for y in rows {
+            let bottom = corners(y + 1);
+            let pairs = (0_u32..).zip(top.windows(2).zip(bottom.windows(2)));
+            solid_angles.extend(pairs.map(|(x, (top, bottom))| match (top, bottom) {
+                ([Some(a), Some(b)], [Some(d), Some(c)]) => self.pixel_solid_angle_sr(x, y, [a, b, c, d]),
                 _ => 0.0,
-            })
-            .collect()
+            }));
+            top = bottom;
+        }
+        solid_angles
+    }
+
+    fn pixel_solid_angle_sr(&self, x: u32, y: u32, [a, b, c, d]: [&Vector3<f64>; 4]) -> f64 {
+        let longest = (a - c).norm().max((b - d).norm());
+        if longest < STRAIGHT_RAD {
+            quad_solid_angle_sr([a, b, c, d])
+        } else {
+            self.divided_solid_angle_sr(x, y, (longest / STRAIGHT_RAD).ceil())
+        }
     }
 
     /// The solid angle of one wide pixel, as the sum over `steps`² parts.
@@ -153,21 +148,13 @@ impl CameraRaster {
         let steps = (steps as u32).clamp(2, MAX_STEPS);
         let at = |i: u32, j: u32| {
             let fraction = |k: u32| f64::from(k) / f64::from(steps);
-            self.direction(RasterPx::new(
-                f64::from(x) + fraction(i),
-                f64::from(y) + fraction(j),
-            ))
+            self.direction(RasterPx::new(f64::from(x) + fraction(i), f64::from(y) + fraction(j)))
         };
         let part = |i: u32, j: u32| {
             let corners = (at(i, j)?, at(i + 1, j)?, at(i + 1, j + 1)?, at(i, j + 1)?);
-            Some(quad_solid_angle_sr([
-                &corners.0, &corners.1, &corners.2, &corners.3,
-            ]))
+            Some(quad_solid_angle_sr([&corners.0, &corners.1, &corners.2, &corners.3]))
         };
-        (0..steps)
-            .flat_map(|j| (0..steps).map(move |i| (i, j)))
-            .filter_map(|(i, j)| part(i, j))
-            .sum()
+        (0..steps).flat_map(|j| (0..steps).map(move |i| (i, j))).filter_map(|(i, j)| part(i, j)).sum()
     }
 }
 

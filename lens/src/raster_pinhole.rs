@@ -46,12 +46,7 @@ impl PinholeRaster {
                 allowed: "two numbers between −1e9 and 1e9",
             });
         }
-        Ok(Self {
-            size_px,
-            focal_px: focal_px.into(),
-            center: center.to_raster(),
-            view_from_frame,
-        })
+        Ok(Self { size_px, focal_px: focal_px.into(), center: center.to_raster(), view_from_frame })
     }
 
     /// A view with square pixels and its axis through the image's middle, `fov_x_rad` wide from the left edge of
@@ -86,8 +81,7 @@ impl PinholeRaster {
         let plane = self.plane(position.0);
         let ray = Vector3::new(plane.x, plane.y, 1.0);
         let norm = ray.norm();
-        norm.is_finite()
-            .then(|| self.view_from_frame.inverse_transform_vector(&(ray / norm)))
+        norm.is_finite().then(|| self.view_from_frame.inverse_transform_vector(&(ray / norm)))
     }
 
     /// The raster position of a direction; `None` behind or beside the camera.

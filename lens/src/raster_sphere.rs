@@ -23,10 +23,7 @@ impl OctahedralRaster {
     pub fn new(side_px: u32, map_from_frame: Rotation3<f64>) -> Result<Self, RasterError> {
         check_size([side_px; 2])?;
         check_rotation(&map_from_frame)?;
-        Ok(Self {
-            side_px,
-            map_from_frame,
-        })
+        Ok(Self { side_px, map_from_frame })
     }
 
     /// Width and height in texels.
@@ -76,10 +73,7 @@ impl LatLongRaster {
     pub fn new(size_px: [u32; 2], map_from_frame: Rotation3<f64>) -> Result<Self, RasterError> {
         check_size(size_px)?;
         check_rotation(&map_from_frame)?;
-        Ok(Self {
-            size_px,
-            map_from_frame,
-        })
+        Ok(Self { size_px, map_from_frame })
     }
 
     /// Width and height in texels.

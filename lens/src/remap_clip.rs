@@ -34,9 +34,7 @@ pub(crate) fn moments(polygon: &[Vector2<f64>], origin: Vector2<f64>) -> Moments
 /// Smallest and largest coordinates.
 pub(crate) fn bounds(polygon: &[Vector2<f64>]) -> (Vector2<f64>, Vector2<f64>) {
     let inf = Vector2::repeat(f64::INFINITY);
-    polygon
-        .iter()
-        .fold((inf, -inf), |(low, high), p| (low.inf(p), high.sup(p)))
+    polygon.iter().fold((inf, -inf), |(low, high), p| (low.inf(p), high.sup(p)))
 }
 
 /// Cuts a polygon at the line `coordinate[axis] = at` (Sutherland and Hodgman, *Reentrant Polygon Clipping*,
@@ -65,6 +63,9 @@ fn split(polygon: &[Vector2<f64>], axis: usize, at: f64, below: &mut Polygon, ab
     }
 }
 
+/// Outlines may leave the image this far without counting as cut.
+const ROUNDING_PX: f64 = 1e-6;
+
 /// Buffers for clipping, kept from polygon to polygon.
 #[derive(Default)]
 pub(crate) struct Clipper {
@@ -76,7 +77,7 @@ pub(crate) struct Clipper {
 }
 
 impl Clipper {
-    /// Cuts `polygon` to [0, width] × [0, height]; says whether anything was cut off.
+    /// Cuts `polygon` to [0, width] × [0, height]; says whether more than rounding was cut off.
     pub fn clip_to_image(&mut self, polygon: &mut Polygon, size_px: [u32; 2]) -> bool {
         let (low, high) = bounds(polygon);
         let mut cut = false;
@@ -85,13 +86,12 @@ impl Clipper {
             if low[axis] < 0.0 {
                 split(polygon, axis, 0.0, &mut self.spare, &mut self.cell);
                 std::mem::swap(polygon, &mut self.cell);
-                cut = true;
             }
             if high[axis] > side {
                 split(polygon, axis, side, &mut self.cell, &mut self.spare);
                 std::mem::swap(polygon, &mut self.cell);
-                cut = true;
             }
+            cut |= low[axis] < -ROUNDING_PX || high[axis] > side + ROUNDING_PX;
         }
         cut
     }
@@ -153,15 +153,7 @@ mod tests {
         let rectangle = [(1.0, 2.0), (3.0, 2.0), (3.0, 5.0), (1.0, 5.0)].map(|(x, y)| Vector2::new(x, y));
         let m = moments(&rectangle, Vector2::zeros());
         // ∫x = 4·3, ∫y = 10.5·2, ∫xy = 4·10.5
-        assert_eq!(
-            m,
-            Moments {
-                area: 6.0,
-                x: 12.0,
-                y: 21.0,
-                xy: 42.0
-            }
-        );
+        assert_eq!(m, Moments { area: 6.0, x: 12.0, y: 21.0, xy: 42.0 });
     }
 
     proptest! {

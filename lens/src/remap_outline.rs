@@ -70,11 +70,7 @@ impl Tracer<'_> {
     pub fn sample(&self, at: Vector2<f64>) -> Sample {
         let direction = self.destination.direction(RasterPx(at));
         let position = direction.and_then(|d| self.source.position(&d)).map(|p| p.0);
-        Sample {
-            at,
-            direction,
-            position,
-        }
+        Sample { at, direction, position }
     }
 
     /// The polyline from `a` to `b`, `b` being to the right of or below `a`.
@@ -118,8 +114,8 @@ impl Tracer<'_> {
         !outside && (m - (p + q) / 2.0).norm() > STRAIGHT_PX
     }
 
-    /// Calls `visit` with polygons that make up the seen part of `quad` (of about `quad_sr`), and whether each is whole. Returns whether
-    /// anything of the outline was seen.
+    /// Calls `visit` with polygons that make up the seen part of `quad` (of about `quad_sr`), and whether each is
+    /// whole. Returns whether anything of the outline was seen.
     pub fn trace(
         &self,
         quad: &Quad,
@@ -164,26 +160,13 @@ impl Tracer<'_> {
     ) -> bool {
         let [nw, ne, sw, se] = quad.corners;
         let middle = |a: &Sample, b: &Sample| self.sample((a.at + b.at) / 2.0);
-        let (n, s, w, e) = (
-            middle(&nw, &ne),
-            middle(&sw, &se),
-            middle(&nw, &sw),
-            middle(&ne, &se),
-        );
+        let (n, s, w, e) = (middle(&nw, &ne), middle(&sw, &se), middle(&nw, &sw), middle(&ne, &se));
         let c = middle(&nw, &se);
         let mut seen = false;
         for corners in [[nw, n, w, c], [n, ne, c, e], [w, c, sw, s], [c, e, s, se]] {
             let [a, b, c, d] = &corners;
             let edges = [self.edge(a, b), self.edge(c, d), self.edge(a, c), self.edge(b, d)];
-            seen |= self.trace(
-                &Quad {
-                    corners,
-                    edges: edges.each_ref(),
-                },
-                quad_sr / 4.0,
-                depth + 1,
-                visit,
-            );
+            seen |= self.trace(&Quad { corners, edges: edges.each_ref() }, quad_sr / 4.0, depth + 1, visit);
         }
         seen
     }
@@ -229,11 +212,7 @@ impl Quad<'_> {
     fn outline(&self) -> Polygon {
         let [top, bottom, left, right] = self.edges;
         let along = top.points.iter().chain(&right.points);
-        along
-            .chain(bottom.points.iter().rev())
-            .chain(left.points.iter().rev())
-            .copied()
-            .collect()
+        along.chain(bottom.points.iter().rev()).chain(left.points.iter().rev()).copied().collect()
     }
 }
 

@@ -1,5 +1,7 @@
 //! Area-true remapping: what must be kept is kept, whatever the pair of rasters.
 
+#![expect(clippy::unwrap_used, reason = "clippy knows only functions marked as tests as tests")]
+
 use coshade_lens::model::{CameraModel, ModelKind};
 use coshade_lens::pixel::RasterPx;
 use coshade_lens::raster::{
@@ -19,13 +21,8 @@ fn fisheye(side: u32) -> Raster {
     let f = f64::from(side) / 2.0 / radius;
     let params = [f, f, center, center, k1, k2, 0.0, 0.0];
     let model = CameraModel::from_params(ModelKind::KannalaBrandt4, &params).unwrap();
-    let circle = ImageCircle {
-        max_angle_deg: Some(93.0),
-        ..ImageCircle::default()
-    };
-    CameraRaster::new(model, [side; 2], circle, Rotation3::identity())
-        .unwrap()
-        .into()
+    let circle = ImageCircle { max_angle_deg: Some(93.0), ..ImageCircle::default() };
+    CameraRaster::new(model, [side; 2], circle, Rotation3::identity()).unwrap().into()
 }
 
 /// A webcam of 70° with barrel distortion.
@@ -34,32 +31,19 @@ fn webcam(width: u32, height: u32) -> Raster {
     let f = f64::from(width) / 1.4;
     let params = [f, f, cx + 3.0, cy - 2.0, -0.2, 0.05, 0.001, -0.0005, 0.0];
     let model = CameraModel::from_params(ModelKind::BrownConrady5, &params).unwrap();
-    CameraRaster::new(
-        model,
-        [width, height],
-        ImageCircle::default(),
-        Rotation3::identity(),
-    )
-    .unwrap()
-    .into()
+    CameraRaster::new(model, [width, height], ImageCircle::default(), Rotation3::identity()).unwrap().into()
 }
 
 fn octahedral(side: u32) -> Raster {
-    OctahedralRaster::new(side, Rotation3::from_euler_angles(0.3, -1.1, 0.7))
-        .unwrap()
-        .into()
+    OctahedralRaster::new(side, Rotation3::from_euler_angles(0.3, -1.1, 0.7)).unwrap().into()
 }
 
 fn pinhole(width: u32, height: u32, fov_deg: f64) -> Raster {
-    PinholeRaster::with_fov([width, height], fov_deg.to_radians(), Rotation3::identity())
-        .unwrap()
-        .into()
+    PinholeRaster::with_fov([width, height], fov_deg.to_radians(), Rotation3::identity()).unwrap().into()
 }
 
 fn lat_long(width: u32) -> Raster {
-    LatLongRaster::new([width, width / 2], Rotation3::from_euler_angles(-0.4, 0.9, 2.0))
-        .unwrap()
-        .into()
+    LatLongRaster::new([width, width / 2], Rotation3::from_euler_angles(-0.4, 0.9, 2.0)).unwrap().into()
 }
 
 /// What each source pixel of radiance 1 brings into the destination, Σ weight · texel's solid angle · covered.
@@ -121,11 +105,9 @@ fn worst_flux_error(source: &Raster, transported: &[f64], inside: impl Fn(Vector
             (-margin, 2.0 + margin),
             (2.0 + margin, 2.0 + margin),
         ];
-        let seen = corners.iter().all(|(dx, dy)| {
-            source
-                .direction(RasterPx::new(x0 + dx, y0 + dy))
-                .is_some_and(&inside)
-        });
+        let seen = corners
+            .iter()
+            .all(|(dx, dy)| source.direction(RasterPx::new(x0 + dx, y0 + dy)).is_some_and(&inside));
         if !seen {
             continue;
         }
@@ -178,14 +160,14 @@ fn the_flux_of_a_moving_lamp_is_kept() {
         let by_points = worst_flux_error(&source, &point_sampled_sr(&source, &destination), everywhere);
         println!("{name}: {error:.5}, point sampling {by_points:.3}");
         assert!(error < 0.01, "{name}: {error}");
+        assert!(
+            !name.starts_with("fish-eye to octahedral 128") || by_points > 3.0,
+            "point sampling: {by_points}"
+        );
     }
     for (name, source, destination) in [
         ("webcam to pinhole", webcam(320, 240), pinhole(200, 150, 66.0)),
-        (
-            "webcam to pinhole, denser",
-            webcam(160, 120),
-            pinhole(500, 375, 66.0),
-        ),
+        ("webcam to pinhole, denser", webcam(160, 120), pinhole(500, 375, 66.0)),
         ("pinhole to webcam", pinhole(400, 300, 80.0), webcam(320, 240)),
         ("octahedral to webcam", octahedral(512), webcam(160, 120)),
         ("octahedral to fish-eye", octahedral(256), fisheye(200)),
@@ -206,11 +188,7 @@ fn all_pairs() -> Vec<(&'static str, Raster, Raster)> {
         ("fish-eye to fine octahedral", fisheye(64), octahedral(200)),
         ("fish-eye to pinhole", fisheye(128), pinhole(80, 60, 100.0)),
         ("fish-eye to lat-long", fisheye(128), lat_long(100)),
-        (
-            "webcam to octahedral of few texels",
-            webcam(64, 48),
-            octahedral(3),
-        ),
+        ("webcam to octahedral of few texels", webcam(64, 48), octahedral(3)),
         ("webcam to one texel", webcam(64, 48), octahedral(1)),
         ("pinhole to webcam", pinhole(64, 48, 100.0), webcam(80, 60)),
         (
@@ -225,9 +203,7 @@ fn all_pairs() -> Vec<(&'static str, Raster, Raster)> {
         (
             "lat-long to lat-long",
             lat_long(64),
-            LatLongRaster::new([50, 30], Rotation3::identity())
-                .unwrap()
-                .into(),
+            LatLongRaster::new([50, 30], Rotation3::identity()).unwrap().into(),
         ),
         (
             "lat-long to aligned octahedral",
@@ -238,9 +214,7 @@ fn all_pairs() -> Vec<(&'static str, Raster, Raster)> {
 }
 
 fn lat_long_upright(width: u32) -> Raster {
-    LatLongRaster::new([width, width / 2], Rotation3::identity())
-        .unwrap()
-        .into()
+    LatLongRaster::new([width, width / 2], Rotation3::identity()).unwrap().into()
 }
 
 /// Weights of a texel sum to exactly 1 in any order and precision, so a constant image comes out bit-identical.
@@ -281,19 +255,11 @@ fn the_whole_flux_arrives() {
         let [w, _] = source.size_px();
         let source_sr = source.solid_angles_sr();
         let image: Vec<f32> = (0..source_sr.len() as u32)
-            .map(|i| {
-                source
-                    .direction(RasterPx::center_of(i % w, i / w))
-                    .map_or(0.0, |d| radiance(&d) as f32)
-            })
+            .map(|i| source.direction(RasterPx::center_of(i % w, i / w)).map_or(0.0, |d| radiance(&d) as f32))
             .collect();
         let mut out = vec![0.0; table.covered().len()];
         table.apply::<1>(&image, &mut out).unwrap();
-        let before: f64 = image
-            .iter()
-            .zip(&source_sr)
-            .map(|(l, sr)| f64::from(*l) * sr)
-            .sum();
+        let before: f64 = image.iter().zip(&source_sr).map(|(l, sr)| f64::from(*l) * sr).sum();
         let after: f64 = (0..out.len())
             .map(|i| f64::from(out[i] * table.covered()[i]) * destination.solid_angles_sr()[i])
             .sum();
@@ -302,10 +268,7 @@ fn the_whole_flux_arrives() {
         if source.size_px()[0] > 30 && matches!(source, Raster::Octahedral(_) | Raster::LatLong(_)) {
             // ∫1 = 4π, ∫z² = 4π/3, the odd parts vanish. Sampling at pixel centres errs with the pixel's size².
             let integral = 4.0 * PI * (1.0 + 0.4 / 3.0);
-            assert!(
-                (after / integral - 1.0).abs() < 3e-3,
-                "{name}: {after} {integral}"
-            );
+            assert!((after / integral - 1.0).abs() < 3e-3, "{name}: {after} {integral}");
         }
     }
 }
@@ -318,9 +281,7 @@ fn a_linear_gradient_is_not_biased() {
         let source = pinhole(100, 80, 40.0);
         let destination = pinhole(columns, rows, 40.0);
         let table = RemapTable::build(&source, &destination).unwrap();
-        let ramp: Vec<f32> = (0..8000)
-            .map(|i| (i % 100) as f32 + 1000.0 * (i / 100) as f32)
-            .collect();
+        let ramp: Vec<f32> = (0..8000).map(|i| (i % 100) as f32 + 1000.0 * (i / 100) as f32).collect();
         let mut out = vec![0.0; (columns * rows) as usize];
         table.apply::<1>(&ramp, &mut out).unwrap();
         let scale = 100.0 / f64::from(columns);
@@ -336,8 +297,8 @@ fn a_linear_gradient_is_not_biased() {
         }
         mean /= f64::from((columns - columns / 8 * 2) * (rows - rows / 8 * 2)) * 1000.0;
         println!("{columns}: mean {mean:.2e} px, worst {worst:.4} px");
-        // Boxes at 1 < magnification < 2 step by up to ¼ px; the mean never leaves. The density of solid angle shifts
-        // the mean of a wide footprint by its slope: footprint² · 3 tan θ / (12 f) px < 0.01 px.
+        // Between magnification 1 and 2 the blend with boxes steps by up to ¼ px times their share; the mean stays.
+        // The density of solid angle shifts a wide footprint's mean: footprint² · 3 tan θ / (12 f) px < 0.01 px.
         assert!(mean.abs() < 1e-3, "{columns}: {mean}");
         assert!(worst < 0.12, "{columns}: {worst}");
     }
@@ -354,6 +315,23 @@ fn magnification_is_smooth() {
     for x in 16..143 {
         let step = out[80 * 160 + x + 1] - out[80 * 160 + x];
         assert!((step - 0.125).abs() < 0.01, "{x}: {step}");
+    }
+}
+
+/// A raster to itself is the identity: one entry a pixel, fully covered, also along the border and the rim.
+#[test]
+fn a_raster_to_itself_is_the_identity() {
+    for raster in [pinhole(50, 40, 70.0), webcam(64, 48), fisheye(60), octahedral(24), lat_long(40)] {
+        let table = RemapTable::build(&raster, &raster).unwrap();
+        for (pixel, sr) in raster.solid_angles_sr().iter().enumerate() {
+            let entries: Vec<_> = table.entries(pixel).collect();
+            if *sr > 0.0 {
+                assert_eq!(entries, [(pixel as u32, 1.0)], "{raster:?}");
+                assert_eq!(table.covered()[pixel], 1.0);
+            } else {
+                assert!(entries.is_empty());
+            }
+        }
     }
 }
 
@@ -383,7 +361,8 @@ fn there_and_back_is_close() {
         }
     }
     let rmse = (sum / count as f32).sqrt();
-    // Two averagings over about 1 px: amplitude × (1 − sinc(1/16)²…²) ≈ 0.25 × 0.05.
+    // In each axis a tent of 1 px and boxes of ½ and 1 px: sinc(1/16)³ sinc(1/32) = 0.98 of the wave is left, in both
+    // 0.96; lost are 0.04 × 0.5, a root mean square of 0.01.
     println!("round trip {rmse}");
     assert!(rmse < 0.02, "{rmse}");
 }
@@ -405,10 +384,7 @@ fn covered_fractions_are_what_the_source_sees() {
         table.covered().iter().map(|c| f64::from(*c)).sum::<f64>() * destination.solid_angles_sr()[0];
     let cone_sr = 2.0 * PI * (1.0 - 93_f64.to_radians().cos());
     // Pixels cut by the circle count as unseen: half a pixel of 400 around the rim.
-    assert!(
-        seen_sr < cone_sr && seen_sr > 0.985 * cone_sr,
-        "{seen_sr} {cone_sr}"
-    );
+    assert!(seen_sr < cone_sr && seen_sr > 0.985 * cone_sr, "{seen_sr} {cone_sr}");
     let partial = table.covered().iter().filter(|c| **c > 0.0 && **c < 1.0).count();
     assert!(partial > 40, "{partial}");
 }
@@ -418,11 +394,8 @@ fn pixels_outside_the_image_circle_never_contribute() {
     let source = fisheye(128);
     let table = RemapTable::build(&source, &octahedral(64)).unwrap();
     // The black frame around the circle is made glaring.
-    let image: Vec<f32> = source
-        .solid_angles_sr()
-        .iter()
-        .map(|sr| if *sr > 0.0 { 1.0 } else { 1e9 })
-        .collect();
+    let image: Vec<f32> =
+        source.solid_angles_sr().iter().map(|sr| if *sr > 0.0 { 1.0 } else { 1e9 }).collect();
     let mut out = vec![0.0; 64 * 64];
     table.apply::<1>(&image, &mut out).unwrap();
     assert!(out.iter().all(|v| *v == 0.0 || *v == 1.0));
@@ -438,23 +411,15 @@ fn solid_angles_agree_with_closed_forms() {
     for side in [64, 1024] {
         let cone = 2.0 * PI * (1.0 - 93_f64.to_radians().cos());
         let missing = 1.0 - sum(&fisheye(side)) / cone;
-        assert!(
-            missing > 0.0 && missing < 3.0 / f64::from(side),
-            "{side}: {missing}"
-        );
+        assert!(missing > 0.0 && missing < 3.0 / f64::from(side), "{side}: {missing}");
     }
 }
 
 #[test]
 fn absurd_sizes_and_lengths_are_errors() {
     for side in [0, 16385, u32::MAX] {
-        let error = OctahedralRaster::new(side, Rotation3::identity())
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.contains(&side.to_string()) && error.contains("16384"),
-            "{error}"
-        );
+        let error = OctahedralRaster::new(side, Rotation3::identity()).unwrap_err().to_string();
+        assert!(error.contains(&side.to_string()) && error.contains("16384"), "{error}");
         assert!(LatLongRaster::new([4, side], Rotation3::identity()).is_err());
         assert!(PinholeRaster::with_fov([side, 4], 1.0, Rotation3::identity()).is_err());
     }
@@ -464,14 +429,8 @@ fn absurd_sizes_and_lengths_are_errors() {
     let not_a_rotation = Rotation3::from_matrix_unchecked(nalgebra::Matrix3::from_element(f64::NAN));
     assert!(OctahedralRaster::new(4, not_a_rotation).is_err());
     let table = RemapTable::build(&pinhole(4, 4, 40.0), &octahedral(2)).unwrap();
-    let error = table
-        .apply::<3>(&[0.0; 47], &mut [0.0; 12])
-        .unwrap_err()
-        .to_string();
-    assert!(
-        error.contains("47") && error.contains("48") && error.contains("source"),
-        "{error}"
-    );
+    let error = table.apply::<3>(&[0.0; 47], &mut [0.0; 12]).unwrap_err().to_string();
+    assert!(error.contains("47") && error.contains("48") && error.contains("source"), "{error}");
     assert!(table.apply::<1>(&[0.0; 16], &mut [0.0; 5]).is_err());
 }
 
