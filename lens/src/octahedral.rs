@@ -15,7 +15,7 @@ use nalgebra::{Vector2, Vector3};
 
 use crate::pixel::{RasterPx, Uv};
 
-/// The place of a direction (any length) in the square [0,1]²; `None` for the zero vector or one that is not finite.
+/// The place of a direction (any length) in the unit square; `None` for the zero vector or one that is not finite.
 pub fn uv_from_direction(direction: &Vector3<f64>) -> Option<Uv> {
     let norm = direction.norm();
     if !(norm.is_finite() && norm > 0.0) {
@@ -43,7 +43,7 @@ fn angle(opposite: f64, adjacent: f64) -> f64 {
     if opposite == 0.0 { 0.0 } else { opposite.atan2(adjacent) }
 }
 
-/// The unit direction of a place in the square. Places outside [0,1]² are first brought back over the fold
+/// The unit direction of a place in the square. Places outside of it are first brought back over the fold
 /// ([`fold`]); the result is a unit vector for every finite place.
 pub fn direction_from_uv(uv: Uv) -> Vector3<f64> {
     let square = fold(uv.0 * 2.0 - Vector2::new(1.0, 1.0));

@@ -89,8 +89,8 @@ fn a_straight_edge_of_the_scene_is_straight() {
     let off_rad = (rays.transpose() * plane).amax();
     println!("bent by {bend:.1} px in the image, {:.2}° off the plane", off_rad.to_degrees());
     assert!(bend > 30.0, "{bend}");
-    // One pixel of reading error and wrinkles of the cloth, at 5 px per degree; the bend alone would be 8°.
-    assert!(off_rad < 0.3_f64.to_radians(), "{}", off_rad.to_degrees());
+    // One pixel of reading error and the wrinkles of the cloth, at 5 px per degree; the bend alone would be 8°.
+    assert!(off_rad < 0.5_f64.to_radians(), "{}", off_rad.to_degrees());
 }
 
 const CORNERS: [(f64, f64); 7] = [
