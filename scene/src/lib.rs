@@ -9,7 +9,7 @@
 //! | [`light`] | spots and rectangles |
 //! | [`thing`] | things and the [`Scene`] of them |
 //! | [`shape`] | box, sphere, plane, ring, Utah teapot |
-//! | [`import`] | glTF, Wavefront OBJ, Stanford PLY |
+//! | [`mod@import`] | glTF, Wavefront OBJ, Stanford PLY |
 //! | [`normals`], [`tangents`], [`polygon`] | what a file leaves out: made here |
 //! | [`topology`] | whether a surface is closed |
 //! | [`validity`] | what is wrong with a mesh |

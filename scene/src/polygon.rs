@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 /// Above so many corners a polygon is taken for convex, so that a hostile file cannot make cutting ears take for ever.
-const MAX_EARS: usize = 1024;
+const MAX_EARS: usize = 256;
 
 /// Triangles of a polygon as positions in `outline`, wound as the polygon. Concave ones are cut ear by ear in the plane
 /// of their mean normal; convex ones, and those that are no simple polygon, become a fan. `n − 2` triangles always.

@@ -128,6 +128,3 @@ pub fn import_with(path: impl AsRef<Path>, options: &ImportOptions) -> Result<Im
     }
     Ok(imported)
 }
-
-#[cfg(test)]
-mod tests;
