@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use coshade_lens::calibration::Calibration;
+
 use crate::control::{Control, ControlInfo, ControlReport, ControlValue};
 use crate::frame::Frame;
 use crate::pixel_format::{ColorEncoding, PixelFormat};
@@ -32,6 +34,11 @@ pub trait Camera: Send {
 
     /// What the frames will be.
     fn stream(&self) -> &StreamInfo;
+
+    /// The lens and sensor data that came with the source (a recording holds them), `None` if it has none.
+    fn calibration(&self) -> Option<&Calibration> {
+        None
+    }
 
     /// The next frame, waiting at most `timeout`.
     ///

@@ -219,8 +219,8 @@ fn check_size(format: PixelFormat, width_px: u32, height_px: u32) -> Result<(), 
         return Err(FrameError::Size { width_px, height_px });
     }
     let which = match format {
-        PixelFormat::Yuyv | PixelFormat::Uyvy if width_px % 2 != 0 => "the width",
-        PixelFormat::Nv12 if width_px % 2 != 0 || height_px % 2 != 0 => "both",
+        PixelFormat::Yuyv | PixelFormat::Uyvy if !width_px.is_multiple_of(2) => "the width",
+        PixelFormat::Nv12 if !(width_px | height_px).is_multiple_of(2) => "both",
         _ => return Ok(()),
     };
     Err(FrameError::OddSize { format, width_px, height_px, which })

@@ -1,4 +1,5 @@
 //! Damaged image files: an error or an image, but never a panic, a hang or a huge allocation.
+#![allow(clippy::unwrap_used, reason = "helpers of tests panic as tests do")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::fs;

@@ -1,6 +1,7 @@
 //! Pixel conversion against the formulas of the ITU and against other decoders.
 //!
 //! `tests/data/formats.json` is made by `tests/peers/formats.py` of the workspace.
+#![allow(clippy::unwrap_used, reason = "helpers of tests panic as tests do")]
 
 use std::sync::LazyLock;
 
@@ -202,6 +203,19 @@ fn jpeg_agrees_with_libjpeg_turbo() {
         assert!(2 * sum < found.len(), "{name}: {:?}", &counts[..8]);
         let luma = differences(&grey(&frame), &bytes(&case.luma));
         assert!(largest(&luma) <= 1, "{name}: luma {:?}", &luma[..8]);
+    }
+}
+
+/// The decoder has code for several processors: a frame must not change its codes with the machine.
+#[test]
+fn jpeg_decodes_to_the_same_codes_with_and_without_vector_instructions() {
+    use zune_jpeg::zune_core::{bytestream::ZCursor, options::DecoderOptions};
+    for case in &PEERS.jpeg {
+        let jpeg = bytes(&case.jpeg);
+        let options = DecoderOptions::default().set_use_unsafe(false);
+        let plain = zune_jpeg::JpegDecoder::new_with_options(ZCursor::new(&jpeg), options).decode().unwrap();
+        let frame = Frame::packed(PixelFormat::Mjpg, case.width, case.height, jpeg).unwrap();
+        assert!(rgb24(&frame, ChromaUpsampling::Linear) == plain, "{}", case.kind);
     }
 }
 

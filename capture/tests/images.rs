@@ -1,4 +1,5 @@
 //! Folders of images as cameras.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests panic as tests do")]
 
 use std::fs;
 use std::path::Path;

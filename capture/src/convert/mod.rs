@@ -156,7 +156,7 @@ impl Converter {
     /// # Errors
     /// As [`rgb24`](Self::rgb24).
     pub fn rgb24_frame(&mut self, frame: &Frame, pool: &FramePool) -> Result<Option<Frame>, ConvertError> {
-        self.into_frame(frame, pool, PixelFormat::Rgb24, Self::rgb24)
+        self.pooled_frame(frame, pool, PixelFormat::Rgb24, Self::rgb24)
     }
 
     /// [`grey`](Self::grey) into a frame of `pool`, everything else as in `frame`; `None` if the pool is empty.
@@ -164,10 +164,10 @@ impl Converter {
     /// # Errors
     /// As [`rgb24`](Self::rgb24).
     pub fn grey_frame(&mut self, frame: &Frame, pool: &FramePool) -> Result<Option<Frame>, ConvertError> {
-        self.into_frame(frame, pool, PixelFormat::Grey, Self::grey)
+        self.pooled_frame(frame, pool, PixelFormat::Grey, Self::grey)
     }
 
-    fn into_frame(
+    fn pooled_frame(
         &mut self,
         frame: &Frame,
         pool: &FramePool,

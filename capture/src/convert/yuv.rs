@@ -59,7 +59,11 @@ impl YuvRows {
         }
         let near = y / 2;
         // A chroma row lies between image rows 2i and 2i + 1: a quarter of its spacing from each.
-        let other = if y % 2 == 0 { near.saturating_sub(1) } else { (near + 1).min(frame.height_px / 2 - 1) };
+        let other = if y.is_multiple_of(2) {
+            near.saturating_sub(1)
+        } else {
+            (near + 1).min(frame.height_px / 2 - 1)
+        };
         let far = match chroma {
             ChromaUpsampling::Linear => other,
             ChromaUpsampling::Nearest => near,
