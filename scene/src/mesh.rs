@@ -116,9 +116,7 @@ impl Mesh {
 
     /// Index triples of all triangles.
     pub fn triangles(&self) -> impl ExactSizeIterator<Item = [u32; 3]> + '_ {
-        self.indices
-            .chunks_exact(3)
-            .map(|corner| [corner[0], corner[1], corner[2]])
+        self.indices.chunks_exact(3).map(|corner| [corner[0], corner[1], corner[2]])
     }
 
     /// Corner positions of all triangles. A mesh that fails [`Mesh::check`] yields NaN for missing corners.
@@ -135,9 +133,7 @@ impl Mesh {
 
     /// Sum of all triangle areas, m², summed in f64.
     pub fn area_m2(&self) -> f64 {
-        self.triangle_positions()
-            .map(|[a, b, c]| triangle_area_m2(a, b, c))
-            .sum()
+        self.triangle_positions().map(|[a, b, c]| triangle_area_m2(a, b, c)).sum()
     }
 
     /// Enclosed volume, m³: positive for a closed mesh that winds outward; meaningless for an open one.
@@ -168,18 +164,9 @@ impl Mesh {
     }
 
     fn check_counts(&self) -> Result<(), MeshError> {
-        let count = |count, what| {
-            Err(MeshError::Count {
-                mesh: self.name.clone(),
-                count,
-                what,
-            })
-        };
+        let count = |count, what| Err(MeshError::Count { mesh: self.name.clone(), count, what });
         if u32::try_from(self.positions.len()).is_err() {
-            return count(
-                self.positions.len(),
-                "positions, more than 32-bit indices can address",
-            );
+            return count(self.positions.len(), "positions, more than 32-bit indices can address");
         }
         if u32::try_from(self.indices.len()).is_err() {
             return count(self.indices.len(), "indices, more than 32 bits can count");
@@ -195,12 +182,7 @@ impl Mesh {
         if found == 0 || found == expected {
             return Ok(());
         }
-        Err(MeshError::AttributeLength {
-            mesh: self.name.clone(),
-            attribute,
-            found,
-            expected,
-        })
+        Err(MeshError::AttributeLength { mesh: self.name.clone(), attribute, found, expected })
     }
 
     fn check_indices(&self) -> Result<(), MeshError> {
@@ -219,13 +201,7 @@ impl Mesh {
     fn check_parts(&self) -> Result<(), MeshError> {
         let triangles = self.triangle_count() as u32;
         let wrong = |part, found: Range<u32>, expected| {
-            Err(MeshError::Parts {
-                mesh: self.name.clone(),
-                part,
-                found,
-                expected,
-                triangles,
-            })
+            Err(MeshError::Parts { mesh: self.name.clone(), part, found, expected, triangles })
         };
         let mut expected = 0;
         for (number, part) in self.parts.iter().enumerate() {

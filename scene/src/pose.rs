@@ -27,34 +27,21 @@ impl Default for Similarity {
 
 impl Similarity {
     /// Changes nothing.
-    pub const IDENTITY: Self = Self {
-        rotation: Quat::IDENTITY,
-        translation_m: Vec3::ZERO,
-        scale: 1.0,
-    };
+    pub const IDENTITY: Self = Self { rotation: Quat::IDENTITY, translation_m: Vec3::ZERO, scale: 1.0 };
 
     /// A pure translation, metres.
     pub fn from_translation(translation_m: Vec3) -> Self {
-        Self {
-            translation_m,
-            ..Self::IDENTITY
-        }
+        Self { translation_m, ..Self::IDENTITY }
     }
 
     /// A pure rotation.
     pub fn from_rotation(rotation: Quat) -> Self {
-        Self {
-            rotation,
-            ..Self::IDENTITY
-        }
+        Self { rotation, ..Self::IDENTITY }
     }
 
     /// A pure scale.
     pub fn from_scale(scale: f32) -> Self {
-        Self {
-            scale,
-            ..Self::IDENTITY
-        }
+        Self { scale, ..Self::IDENTITY }
     }
 
     /// True if all numbers are finite, the scale is positive and the quaternion has unit length (to 1e-3).
@@ -77,11 +64,7 @@ impl Similarity {
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.conjugate();
         let scale = 1.0 / self.scale;
-        Self {
-            rotation,
-            translation_m: rotation * (-scale * self.translation_m),
-            scale,
-        }
+        Self { rotation, translation_m: rotation * (-scale * self.translation_m), scale }
     }
 
     /// As a 4×4 matrix for column vectors.
@@ -148,9 +131,7 @@ impl Pose {
     pub fn frame_from_thing(&self) -> &Similarity {
         match self {
             Self::World(world_from_thing) => world_from_thing,
-            Self::Marker {
-                marker_from_thing, ..
-            } => marker_from_thing,
+            Self::Marker { marker_from_thing, .. } => marker_from_thing,
             Self::Body { body_from_thing, .. } => body_from_thing,
             Self::Board { board_from_thing, .. } => board_from_thing,
         }

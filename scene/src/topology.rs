@@ -74,12 +74,7 @@ impl Topology {
 
 fn corners(mesh: &Mesh, triangle: u32) -> Option<[Vec3; 3]> {
     let [a, b, c] = mesh.triangle(triangle as usize)?;
-    let at = |index: u32| {
-        mesh.positions
-            .get(index as usize)
-            .copied()
-            .filter(|point| point.is_finite())
-    };
+    let at = |index: u32| mesh.positions.get(index as usize).copied().filter(|point| point.is_finite());
     Some([at(a)?, at(b)?, at(c)?])
 }
 
@@ -108,21 +103,14 @@ impl Welded {
     }
 
     fn topology(self) -> Topology {
-        let mut topology = Topology {
-            faces: self.faces.len(),
-            ..Topology::default()
-        };
+        let mut topology = Topology { faces: self.faces.len(), ..Topology::default() };
         let mut used = vec![false; self.points.len()];
-        self.faces
-            .iter()
-            .flatten()
-            .for_each(|&corner| used[corner as usize] = true);
+        self.faces.iter().flatten().for_each(|&corner| used[corner as usize] = true);
         topology.vertices = used.iter().filter(|&&used| used).count();
         let mut pieces = DisjointSets::new(self.faces.len());
         for same in self.edges().chunk_by(|a, b| a.ends == b.ends) {
             self.count_edge(same, &mut topology);
-            same.windows(2)
-                .for_each(|pair| pieces.join(pair[0].face, pair[1].face));
+            same.windows(2).for_each(|pair| pieces.join(pair[0].face, pair[1].face));
         }
         topology.components = self.components(pieces);
         topology
@@ -159,12 +147,7 @@ impl Welded {
         for (number, face) in self.faces.iter().enumerate() {
             let [a, b, c] = face.map(|vertex| self.points[vertex as usize]);
             let number = *slot.entry(pieces.find(number as u32)).or_insert_with(|| {
-                components.push(Component {
-                    faces: 0,
-                    volume_m3: 0.0,
-                    min: a,
-                    max: a,
-                });
+                components.push(Component { faces: 0, volume_m3: 0.0, min: a, max: a });
                 components.len() - 1
             });
             let component = &mut components[number];
@@ -196,9 +179,7 @@ struct DisjointSets {
 
 impl DisjointSets {
     fn new(count: usize) -> Self {
-        Self {
-            parent: (0..count as u32).collect(),
-        }
+        Self { parent: (0..count as u32).collect() }
     }
 
     fn find(&mut self, mut member: u32) -> u32 {

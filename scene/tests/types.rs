@@ -103,8 +103,8 @@ fn rectangle_power() {
 fn reflectances_and_lobes() {
     assert!((Material::glass(1.5).dielectric_f0() - 0.04).abs() < 1e-6);
     assert_eq!(Material { ior: 0.0, ..Material::default() }.dielectric_f0(), 1.0);
-    // Gold in red light (η = 0.166, k = 3.14): (0.834² + 3.14²)/(1.166² + 3.14²) = 0.9408.
-    assert!((fresnel_f0(0.166, 3.14) - 0.9408).abs() < 1e-4);
+    // Gold in red light (η = 0.166, k = 3.15): (0.834² + 3.15²)/(1.166² + 3.15²) = 0.94115.
+    assert!((fresnel_f0(0.166, 3.15) - 0.94115).abs() < 1e-4);
     // 2/α² − 2 by hand: α = 0.5 gives 6; and back.
     assert_eq!(phong_exponent(0.5), 6.0);
     assert!((alpha_from_phong(phong_exponent(0.3)) - 0.3).abs() < 1e-6);

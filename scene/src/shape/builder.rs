@@ -43,11 +43,7 @@ impl Builder {
     pub fn fan(&mut self, rim: &[Vec3], normal: Vec3) {
         let center = rim.iter().sum::<Vec3>() / rim.len() as f32;
         let middle = Vec2::splat(0.5);
-        let first = self.vertex(Vertex {
-            position: center,
-            normal,
-            uv: middle,
-        });
+        let first = self.vertex(Vertex { position: center, normal, uv: middle });
         for (i, &position) in rim.iter().enumerate() {
             let angle = i as f32 / rim.len() as f32 * std::f32::consts::TAU;
             let uv = middle + Vec2::new(angle.cos(), -angle.sin()) / 2.0;
@@ -63,10 +59,7 @@ impl Builder {
     pub fn finish(mut self, name: &str) -> Mesh {
         name.clone_into(&mut self.mesh.name);
         let triangles = self.mesh.triangle_count() as u32;
-        self.mesh.parts = vec![Part {
-            triangles: 0..triangles,
-            material: 0,
-        }];
+        self.mesh.parts = vec![Part { triangles: 0..triangles, material: 0 }];
         self.mesh
     }
 

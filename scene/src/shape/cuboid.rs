@@ -30,11 +30,7 @@ pub fn cuboid(size_m: Vec3) -> Result<Mesh, ShapeError> {
         builder.grid(1, 1, |column, row| {
             let (u, up_share) = (column as f32, row as f32);
             let unit = right * (u - 0.5) + up * (up_share - 0.5) + normal * 0.5;
-            Vertex {
-                position: unit * size_m,
-                normal,
-                uv: Vec2::new(u, 1.0 - up_share),
-            }
+            Vertex { position: unit * size_m, normal, uv: Vec2::new(u, 1.0 - up_share) }
         });
     }
     Ok(builder.finish("box"))

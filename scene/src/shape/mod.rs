@@ -110,23 +110,14 @@ fn check_size(shape: &'static str, field: &'static str, value: f32) -> Result<()
     if value.is_finite() && (1e-9..=1e6).contains(&value) {
         return Ok(());
     }
-    Err(ShapeError::Size {
-        shape,
-        field,
-        value,
-        expected: "a length from 1e-9 to 1e6 metres".to_owned(),
-    })
+    Err(ShapeError::Size { shape, field, value, expected: "a length from 1e-9 to 1e6 metres".to_owned() })
 }
 
 fn check_segments(shape: &'static str, value: u32, least: u32, most: u32) -> Result<(), ShapeError> {
     if (least..=most).contains(&value) {
         return Ok(());
     }
-    Err(ShapeError::Segments {
-        shape,
-        value,
-        expected: format!("{least} to {most}"),
-    })
+    Err(ShapeError::Segments { shape, value, expected: format!("{least} to {most}") })
 }
 
 #[cfg(test)]

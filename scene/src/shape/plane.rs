@@ -18,11 +18,7 @@ pub fn plane(size_m: Vec2) -> Result<Mesh, ShapeError> {
     builder.grid(1, 1, |column, row| {
         let (x, y) = (column as f32, row as f32);
         let position = Vec3::new((x - 0.5) * size_m.x, (y - 0.5) * size_m.y, 0.0);
-        Vertex {
-            position,
-            normal: Vec3::Z,
-            uv: Vec2::new(x, 1.0 - y),
-        }
+        Vertex { position, normal: Vec3::Z, uv: Vec2::new(x, 1.0 - y) }
     });
     Ok(builder.finish("plane"))
 }

@@ -45,11 +45,7 @@ pub fn ring(size: RingSize, segments: u32) -> Result<Mesh, ShapeError> {
             let turned = |p: DVec2| DVec3::new(p.x * cos, p.x * sin, p.y).as_vec3();
             let along = (done + piece.length() * f64::from(row) / f64::from(rows)) / length;
             let uv = Vec2::new(column as f32 / segments as f32, 1.0 - along as f32);
-            Vertex {
-                position: turned(point),
-                normal: turned(normal),
-                uv,
-            }
+            Vertex { position: turned(point), normal: turned(normal), uv }
         });
         done += piece.length();
     }
@@ -61,14 +57,7 @@ fn check(size: &RingSize, segments: u32) -> Result<(), ShapeError> {
     check_size("ring", "outer_radius_m", size.outer_radius_m)?;
     check_size("ring", "height_m", size.height_m)?;
     check_segments("ring", segments, 3, MAX_SEGMENTS)?;
-    let wrong = |field, value, expected| {
-        Err(ShapeError::Size {
-            shape: "ring",
-            field,
-            value,
-            expected,
-        })
-    };
+    let wrong = |field, value, expected| Err(ShapeError::Size { shape: "ring", field, value, expected });
     let wall_m = size.outer_radius_m - size.inner_radius_m;
     if wall_m < 1e-6 * size.outer_radius_m {
         let expected = format!("more than inner_radius_m = {}", size.inner_radius_m);
@@ -77,26 +66,15 @@ fn check(size: &RingSize, segments: u32) -> Result<(), ShapeError> {
     // One part in 10⁵ above the limit is rounding: (0.011 − 0.009)/2 in f32 is not 0.001.
     let most = wall_m.min(size.height_m) / 2.0;
     if !(0.0..=most * 1.00001).contains(&size.bevel_m) {
-        return wrong(
-            "bevel_m",
-            size.bevel_m,
-            format!("0 to {most}, half the wall and half the height"),
-        );
+        return wrong("bevel_m", size.bevel_m, format!("0 to {most}, half the wall and half the height"));
     }
     Ok(())
 }
 
 /// A part of the profile in (distance from the axis, z).
 enum Piece {
-    Wall {
-        ends: [DVec2; 2],
-        normal: DVec2,
-    },
-    Corner {
-        center: DVec2,
-        radius: f64,
-        quarter: u32,
-    },
+    Wall { ends: [DVec2; 2], normal: DVec2 },
+    Corner { center: DVec2, radius: f64, quarter: u32 },
 }
 
 impl Piece {
@@ -109,24 +87,15 @@ impl Piece {
 
     fn length(&self) -> f64 {
         match self {
-            Self::Wall {
-                ends: [start, end], ..
-            } => start.distance(*end),
+            Self::Wall { ends: [start, end], .. } => start.distance(*end),
             Self::Corner { radius, .. } => radius * std::f64::consts::FRAC_PI_2,
         }
     }
 
     fn at(&self, row: u32) -> (DVec2, DVec2) {
         match self {
-            Self::Wall {
-                ends: [start, end],
-                normal,
-            } => (if row == 0 { *start } else { *end }, *normal),
-            Self::Corner {
-                center,
-                radius,
-                quarter,
-            } => {
+            Self::Wall { ends: [start, end], normal } => (if row == 0 { *start } else { *end }, *normal),
+            Self::Corner { center, radius, quarter } => {
                 let normal = quarter_turn(*quarter, row);
                 (*center + *radius * normal, normal)
             }
@@ -147,13 +116,7 @@ fn profile(size: &RingSize) -> Vec<Piece> {
     let half = DVec2::new((outer - inner) / 2.0, f64::from(size.height_m) / 2.0);
     let radius = f64::from(size.bevel_m).min(half.min_element());
     // A wall that rounding leaves between two corners would be a sliver: the corners meet instead.
-    let inset = (half - radius).map(|rest| {
-        if rest < 1e-5 * half.min_element() {
-            0.0
-        } else {
-            rest
-        }
-    });
+    let inset = (half - radius).map(|rest| if rest < 1e-5 * half.min_element() { 0.0 } else { rest });
     let signs = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
     let centers = signs.map(|(x, y)| middle + inset * DVec2::new(x, y));
     let mut pieces = Vec::with_capacity(8);
@@ -166,11 +129,7 @@ fn profile(size: &RingSize) -> Vec<Piece> {
             pieces.push(Piece::Wall { ends, normal });
         }
         if radius > 0.0 {
-            pieces.push(Piece::Corner {
-                center,
-                radius,
-                quarter,
-            });
+            pieces.push(Piece::Corner { center, radius, quarter });
         }
     }
     pieces

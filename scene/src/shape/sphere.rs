@@ -17,29 +17,18 @@ pub fn sphere(radius_m: f32, segments: u32) -> Result<Mesh, ShapeError> {
     check_segments("sphere", segments, 4, MAX_SEGMENTS)?;
     if !segments.is_multiple_of(2) {
         let expected = "an even number".to_owned();
-        return Err(ShapeError::Segments {
-            shape: "sphere",
-            value: segments,
-            expected,
-        });
+        return Err(ShapeError::Segments { shape: "sphere", value: segments, expected });
     }
     let bands = segments / 2;
     let mut builder = Builder::default();
     builder.grid(segments, bands, |column, row| {
         let (cos_longitude, sin_longitude) = cos_sin_of_turn(column, segments);
         let (minus_sin_latitude, cos_latitude) = cos_sin_of_turn(row, segments);
-        let direction = DVec3::new(
-            cos_latitude * cos_longitude,
-            cos_latitude * sin_longitude,
-            -minus_sin_latitude,
-        );
+        let direction =
+            DVec3::new(cos_latitude * cos_longitude, cos_latitude * sin_longitude, -minus_sin_latitude);
         let uv = Vec2::new(column as f32 / segments as f32, 1.0 - row as f32 / bands as f32);
         let position = (direction * f64::from(radius_m)).as_vec3();
-        Vertex {
-            position,
-            normal: direction.as_vec3(),
-            uv,
-        }
+        Vertex { position, normal: direction.as_vec3(), uv }
     });
     Ok(builder.finish("sphere"))
 }

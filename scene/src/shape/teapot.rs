@@ -21,12 +21,7 @@ const PROFILE: [[[f64; 3]; 4]; 6] = [
     [on(0.0, 0.0), on(1.425, 0.0), on(1.5, 0.075), on(1.5, 0.15)],
     [on(1.5, 0.15), on(1.5, 0.225), on(2.0, 0.45), on(2.0, 0.9)],
     [on(2.0, 0.9), on(2.0, 1.35), on(1.75, 1.875), on(1.5, 2.4)],
-    [
-        on(1.5, 2.4),
-        on(1.4375, 2.53125),
-        on(1.3375, 2.53125),
-        on(1.4, 2.4),
-    ],
+    [on(1.5, 2.4), on(1.4375, 2.53125), on(1.3375, 2.53125), on(1.4, 2.4)],
     [on(1.3, 2.4), on(1.3, 2.55), on(0.4, 2.55), on(0.2, 2.7)],
     [on(0.2, 2.7), on(0.0, 2.85), [0.8, 3.15, 0.45], on(0.0, 3.15)],
 ];
@@ -99,11 +94,7 @@ pub enum TeapotLid {
 pub fn teapot(height_m: f32, segments: u32, lid: TeapotLid) -> Result<Mesh, ShapeError> {
     check_size("teapot", "height_m", height_m)?;
     check_segments("teapot", segments, 2, MAX_PATCH_SEGMENTS)?;
-    let mut pot = Teapot {
-        builder: Builder::default(),
-        segments,
-        scale: f64::from(height_m) / HEIGHT,
-    };
+    let mut pot = Teapot { builder: Builder::default(), segments, scale: f64::from(height_m) / HEIGHT };
     pot.turned(lid);
     pot.tubes(&HANDLE, lid);
     pot.tubes(&SPOUT, lid);
@@ -147,11 +138,7 @@ impl Teapot {
             let u = share(column, segments);
             let position = (curve(&edge, u) * scale).as_vec3();
             let uv = Vec2::new((u as f32 + quarter as f32) / 4.0, 1.0 - row as f32);
-            Vertex {
-                position,
-                normal: Vec3::Z,
-                uv,
-            }
+            Vertex { position, normal: Vec3::Z, uv }
         });
     }
 
@@ -161,10 +148,7 @@ impl Teapot {
         for (number, (near, far)) in near.iter().zip(&far).enumerate() {
             for (side, patch) in [near, far].into_iter().enumerate() {
                 self.patch(patch, |u, v| {
-                    Vec2::new(
-                        (u + side as f64) as f32 / 2.0,
-                        1.0 - ((v + number as f64) / 2.0) as f32,
-                    )
+                    Vec2::new((u + side as f64) as f32 / 2.0, 1.0 - ((v + number as f64) / 2.0) as f32)
                 });
             }
         }
@@ -186,11 +170,7 @@ impl Teapot {
     }
 
     fn cap(&mut self, rim: &[Vec3]) {
-        let doubled_area = rim
-            .iter()
-            .zip(rim.iter().cycle().skip(1))
-            .map(|(a, b)| a.cross(*b))
-            .sum::<Vec3>();
+        let doubled_area = rim.iter().zip(rim.iter().cycle().skip(1)).map(|(a, b)| a.cross(*b)).sum::<Vec3>();
         self.builder.fan(rim, doubled_area.normalize_or(Vec3::Z));
     }
 
@@ -199,11 +179,7 @@ impl Teapot {
         self.builder.grid(segments, segments, |column, row| {
             let (u, v) = (share(column, segments), share(row, segments));
             let position = (point(patch, u, v) * scale).as_vec3();
-            Vertex {
-                position,
-                normal: normal(patch, u, v).as_vec3(),
-                uv: uv(u, v),
-            }
+            Vertex { position, normal: normal(patch, u, v).as_vec3(), uv: uv(u, v) }
         });
     }
 }
@@ -236,20 +212,11 @@ fn bernstein(t: f64) -> [f64; 4] {
 
 fn bernstein_slope(t: f64) -> [f64; 4] {
     let s = 1.0 - t;
-    [
-        -3.0 * s * s,
-        3.0 * s * (s - 2.0 * t),
-        3.0 * t * (2.0 * s - t),
-        3.0 * t * t,
-    ]
+    [-3.0 * s * s, 3.0 * s * (s - 2.0 * t), 3.0 * t * (2.0 * s - t), 3.0 * t * t]
 }
 
 fn weighted(weights: [f64; 4], points: &[DVec3; 4]) -> DVec3 {
-    weights
-        .iter()
-        .zip(points)
-        .map(|(weight, point)| *weight * *point)
-        .sum()
+    weights.iter().zip(points).map(|(weight, point)| *weight * *point).sum()
 }
 
 fn curve(row: &[DVec3; 4], u: f64) -> DVec3 {

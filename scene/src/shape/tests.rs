@@ -29,29 +29,18 @@ fn assert_sound(mesh: &Mesh) {
         assert!((normal.length() - 1.0).abs() < 1e-6, "{normal}");
     }
     for uv in &mesh.uvs {
-        assert!(
-            uv.cmpge(Vec2::splat(-1e-6)).all() && uv.cmple(Vec2::splat(1.0 + 1e-6)).all(),
-            "{uv}"
-        );
+        assert!(uv.cmpge(Vec2::splat(-1e-6)).all() && uv.cmple(Vec2::splat(1.0 + 1e-6)).all(), "{uv}");
     }
     for (triangle, [a, b, c]) in mesh.triangles().zip(mesh.triangle_positions()) {
         let facing = (b - a).cross(c - a);
         assert!(facing.length() > 0.0, "{}: degenerate {a} {b} {c}", mesh.name);
         for corner in triangle {
             let normal = mesh.normals[corner as usize];
-            assert!(
-                normal.dot(facing) > 0.0,
-                "{}: {normal} against {facing} at {a} {b} {c}",
-                mesh.name
-            );
+            assert!(normal.dot(facing) > 0.0, "{}: {normal} against {facing} at {a} {b} {c}", mesh.name);
         }
         let [ua, ub, uc] = triangle.map(|corner| mesh.uvs[corner as usize]);
         // v runs down: an unmirrored picture turns clockwise in (u, v) where the triangle turns counter-clockwise.
-        assert!(
-            (ub - ua).perp_dot(uc - ua) < 1e-7,
-            "{}: mirrored uv {ua} {ub} {uc}",
-            mesh.name
-        );
+        assert!((ub - ua).perp_dot(uc - ua) < 1e-7, "{}: mirrored uv {ua} {ub} {uc}", mesh.name);
     }
 }
 
@@ -129,93 +118,41 @@ fn sphere_converges_to_the_ball() {
 #[test]
 fn ring_obeys_pappus() {
     let sizes = [
-        RingSize {
-            inner_radius_m: 0.009,
-            outer_radius_m: 0.0105,
-            height_m: 0.004,
-            bevel_m: 0.0,
-        },
-        RingSize {
-            inner_radius_m: 0.009,
-            outer_radius_m: 0.0105,
-            height_m: 0.004,
-            bevel_m: 0.0004,
-        },
-        RingSize {
-            inner_radius_m: 0.009,
-            outer_radius_m: 0.011,
-            height_m: 0.006,
-            bevel_m: 0.001,
-        },
-        RingSize {
-            inner_radius_m: 0.009,
-            outer_radius_m: 0.011,
-            height_m: 0.002,
-            bevel_m: 0.001,
-        },
+        RingSize { inner_radius_m: 0.009, outer_radius_m: 0.0105, height_m: 0.004, bevel_m: 0.0 },
+        RingSize { inner_radius_m: 0.009, outer_radius_m: 0.0105, height_m: 0.004, bevel_m: 0.0004 },
+        RingSize { inner_radius_m: 0.009, outer_radius_m: 0.011, height_m: 0.006, bevel_m: 0.001 },
+        RingSize { inner_radius_m: 0.009, outer_radius_m: 0.011, height_m: 0.002, bevel_m: 0.001 },
     ];
     let (segments, n) = (512, 512.0_f64);
     for size in sizes {
         let mesh = ring(size, segments).unwrap();
         assert_sound(&mesh);
-        let [inner, outer, height, bevel] = [
-            size.inner_radius_m,
-            size.outer_radius_m,
-            size.height_m,
-            size.bevel_m,
-        ]
-        .map(f64::from);
+        let [inner, outer, height, bevel] =
+            [size.inner_radius_m, size.outer_radius_m, size.height_m, size.bevel_m].map(f64::from);
         let (wall, way) = (outer - inner, PI * (inner + outer));
         // Bevels are 12 chords to a quarter.
-        let (corner_length, corner_area) = (
-            24.0 * bevel * (PI / 48.0).sin(),
-            6.0 * bevel * bevel * (PI / 24.0).sin(),
-        );
+        let (corner_length, corner_area) =
+            (24.0 * bevel * (PI / 48.0).sin(), 6.0 * bevel * bevel * (PI / 24.0).sin());
         let perimeter = 2.0 * (wall + height) - 8.0 * bevel + 4.0 * corner_length;
         let profile = wall * height - 4.0 * bevel * bevel + 4.0 * corner_area;
         let polygon = (TAU / n).sin() * n / TAU;
-        assert_close(
-            mesh.volume_m3(),
-            polygon * way * profile,
-            10.0 * ROUNDING,
-            "volume",
-        );
+        assert_close(mesh.volume_m3(), polygon * way * profile, 10.0 * ROUNDING, "volume");
         // Of the surface upright walls shrink by sin(π/n)·n/π, level ones by `polygon`, which is less.
-        assert_close(
-            mesh.area_m2(),
-            way * perimeter,
-            1.0 - polygon + 10.0 * ROUNDING,
-            "area",
-        );
+        assert_close(mesh.area_m2(), way * perimeter, 1.0 - polygon + 10.0 * ROUNDING, "area");
         let topology = Topology::of(&mesh);
         assert!(topology.is_closed(), "{size:?}");
-        assert_eq!(
-            (topology.euler_characteristic(), topology.components.len()),
-            (0, 1),
-            "{size:?}"
-        );
+        assert_eq!((topology.euler_characteristic(), topology.components.len()), (0, 1), "{size:?}");
     }
 }
 
 #[test]
 fn ring_with_round_profile_is_a_torus() {
-    let size = RingSize {
-        inner_radius_m: 0.75,
-        outer_radius_m: 1.25,
-        height_m: 0.5,
-        bevel_m: 0.25,
-    };
+    let size = RingSize { inner_radius_m: 0.75, outer_radius_m: 1.25, height_m: 0.5, bevel_m: 0.25 };
     let mesh = ring(size, 48).unwrap();
     for (position, normal) in mesh.positions.iter().zip(&mesh.normals) {
         let on_circle = position.truncate().normalize_or_zero().extend(0.0);
-        assert!(
-            ((*position - on_circle).length() - 0.25).abs() < 1e-6,
-            "{position}"
-        );
-        assert!(
-            ((*position - on_circle) / 0.25 - *normal).length() < 1e-5,
-            "{position} {normal}"
-        );
+        assert!(((*position - on_circle).length() - 0.25).abs() < 1e-6, "{position}");
+        assert!(((*position - on_circle) / 0.25 - *normal).length() < 1e-5, "{position} {normal}");
     }
 }
 
@@ -231,15 +168,8 @@ fn sealed_teapot_is_three_closed_surfaces() {
             &topology.open_edges[..topology.open_edges.len().min(4)]
         );
         // Three spheres, but the lower end of the handle touches the pot in the one point (−2, 0, 0.9).
-        assert_eq!(
-            (topology.components.len(), topology.euler_characteristic()),
-            (3, 6 - 1)
-        );
-        assert!(
-            topology.components.iter().all(|part| part.volume_m3 > 0.0),
-            "{:?}",
-            topology.components
-        );
+        assert_eq!((topology.components.len(), topology.euler_characteristic()), (3, 6 - 1));
+        assert!(topology.components.iter().all(|part| part.volume_m3 > 0.0), "{:?}", topology.components);
     }
     assert_sound(&teapot(0.315, 10, TeapotLid::Sealed).unwrap());
 }
@@ -263,11 +193,7 @@ fn teapot_has_newells_measures() {
 #[test]
 fn pot_has_the_volume_of_its_outline() {
     let mesh = teapot(3.15, 64, TeapotLid::Sealed).unwrap();
-    let pot = Topology::of(&mesh)
-        .components
-        .iter()
-        .map(|part| part.volume_m3)
-        .fold(0.0, f64::max);
+    let pot = Topology::of(&mesh).components.iter().map(|part| part.volume_m3).fold(0.0, f64::max);
     let bezier = |p: [f64; 4], t: f64| {
         let s = 1.0 - t;
         s * s * s * p[0] + 3.0 * s * s * t * p[1] + 3.0 * s * t * t * p[2] + t * t * t * p[3]
@@ -279,11 +205,8 @@ fn pot_has_the_volume_of_its_outline() {
             [bezier([1.0, 1.0, 0.56, 0.0], t), bezier([0.0, 0.56, 1.0, 1.0], t)]
         })
         .collect();
-    let unit_area: f64 = 2.0
-        * quarter_points
-            .windows(2)
-            .map(|w| w[0][0] * w[1][1] - w[1][0] * w[0][1])
-            .sum::<f64>();
+    let unit_area: f64 =
+        2.0 * quarter_points.windows(2).map(|w| w[0][0] * w[1][1] - w[1][0] * w[0][1]).sum::<f64>();
     // r and z of the outline from the bottom to the knob; rings in between are flat and add nothing to ∫ r² dz.
     let outline = [
         ([0.0, 1.425, 1.5, 1.5], [0.0, 0.0, 0.075, 0.15]),
@@ -313,22 +236,13 @@ fn teapot_normals_are_those_of_the_surface() {
         let mesh = teapot(1.0, segments, TeapotLid::Open).unwrap();
         let mut sums = vec![Vec3::ZERO; mesh.positions.len()];
         for (corners, [a, b, c]) in mesh.triangles().zip(mesh.triangle_positions()) {
-            corners
-                .iter()
-                .for_each(|&corner| sums[corner as usize] += (b - a).cross(c - a));
+            corners.iter().for_each(|&corner| sums[corner as usize] += (b - a).cross(c - a));
         }
         let angle = |(sum, normal): (&Vec3, &Vec3)| sum.angle_between(*normal);
-        sums.iter()
-            .zip(&mesh.normals)
-            .filter(|(sum, _)| **sum != Vec3::ZERO)
-            .map(angle)
-            .fold(0.0, f32::max)
+        sums.iter().zip(&mesh.normals).filter(|(sum, _)| **sum != Vec3::ZERO).map(angle).fold(0.0, f32::max)
     };
     let [coarse, fine] = [worst(16), worst(64)];
-    assert!(
-        fine < 0.5 * coarse && fine < 0.12,
-        "largest angle {coarse} with 16 segments, {fine} with 64"
-    );
+    assert!(fine < 0.5 * coarse && fine < 0.12, "largest angle {coarse} with 16 segments, {fine} with 64");
 }
 
 #[test]
@@ -354,28 +268,9 @@ fn bad_measures_are_named() {
     assert!(text(sphere(1.0, u32::MAX)).contains("4 to 2048"));
     assert!(text(plane(Vec2::new(f32::INFINITY, 1.0))).contains("size_m.x = inf"));
     assert!(text(teapot(1.0, 0, TeapotLid::Open)).contains("segments = 0"));
-    let size = RingSize {
-        inner_radius_m: 2.0,
-        outer_radius_m: 1.0,
-        height_m: 1.0,
-        bevel_m: 0.0,
-    };
+    let size = RingSize { inner_radius_m: 2.0, outer_radius_m: 1.0, height_m: 1.0, bevel_m: 0.0 };
     assert!(text(ring(size, 64)).contains("outer_radius_m = 1"));
-    let size = RingSize {
-        inner_radius_m: 1.0,
-        outer_radius_m: 1.2,
-        height_m: 1.0,
-        bevel_m: 0.2,
-    };
+    let size = RingSize { inner_radius_m: 1.0, outer_radius_m: 1.2, height_m: 1.0, bevel_m: 0.2 };
     assert!(text(ring(size, 64)).contains("bevel_m = 0.2"));
-    assert!(
-        text(ring(
-            RingSize {
-                bevel_m: f32::NAN,
-                ..size
-            },
-            64
-        ))
-        .contains("bevel_m = NaN")
-    );
+    assert!(text(ring(RingSize { bevel_m: f32::NAN, ..size }, 64)).contains("bevel_m = NaN"));
 }
