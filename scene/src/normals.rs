@@ -25,3 +25,16 @@ pub fn flat(a: Vec3, b: Vec3, c: Vec3) -> Vec3 {
     let [a, b, c] = [a, b, c].map(|corner| corner.as_dvec3());
     (b - a).cross(c - a).normalize_or(glam::DVec3::Z).as_vec3()
 }
+
+/// Replaces normals that are not of unit length by those of [`smooth`], and says how many.
+///
+/// Indices must be in range, and there must be a normal for each position.
+pub fn repair(normals: &mut [Vec3], positions: &[Vec3], indices: &[u32]) -> usize {
+    let broken = normals.iter().filter(|normal| !normal.is_normalized()).count();
+    if broken > 0 {
+        let replacements = smooth(positions, indices);
+        let pairs = normals.iter_mut().zip(replacements);
+        pairs.filter(|(normal, _)| !normal.is_normalized()).for_each(|(normal, smooth)| *normal = smooth);
+    }
+    broken
+}

@@ -119,6 +119,20 @@ fn up_axis_unit_and_shading_can_be_stated() {
 }
 
 #[test]
+fn broken_normals_are_replaced_and_told() {
+    let Imported { mesh, warnings, .. } =
+        imported("n.obj", &format!("{SQUARE}vn 0 0 0\nvn 0 0 1\nf 1//1 2//2 3//2\n")).unwrap();
+    assert!(mesh.normals.iter().all(|&normal| normal == Vec3::Z));
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float nx\n\
+               property float ny\nproperty float nz\nelement face 1\nproperty list uchar int vertex_index\nend_header\n\
+               0 0 0 0 0 0\n1 0 0 nan 0 0\n0 1 0 0 0 3\n3 0 1 2\n";
+    let Imported { mesh, warnings, .. } = imported("n.ply", ply).unwrap();
+    assert!(mesh.normals.iter().all(|&normal| normal == Vec3::Z));
+    assert_eq!(warnings, ["2 normals are zero or not finite, smooth ones instead"]);
+}
+
+#[test]
 fn ply_of_trimesh() {
     for name in ["cube_ascii.ply", "cube_binary.ply"] {
         let mesh = import(data(name)).unwrap().mesh;

@@ -154,6 +154,12 @@ impl Parser {
         for (keyword, (first, count)) in &self.left_out {
             assembly.warnings.push(format!("line {first}: '{keyword}' ({count} lines) is left out"));
         }
+        let broken = self.normals.iter().filter(|normal| normal.try_normalize().is_none()).count();
+        if broken > 0 {
+            assembly
+                .warnings
+                .push(format!("{broken} normals (vn) are zero or not finite, the faces' own instead"));
+        }
         if !self.colors.is_empty() {
             self.colors.resize(self.positions.len(), Vec4::ONE);
         }

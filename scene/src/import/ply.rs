@@ -202,10 +202,11 @@ impl Reader {
         if lacking && options.missing_normals == MissingNormals::Flat {
             piece = flat_shaded(&piece);
         } else {
-            let smooth = normals::smooth(&piece.positions, &piece.indices);
             piece.normals.resize(piece.positions.len(), Vec3::ZERO);
-            let pairs = piece.normals.iter_mut().zip(smooth);
-            pairs.filter(|(normal, _)| !normal.is_normalized()).for_each(|(normal, smooth)| *normal = smooth);
+            let repaired = normals::repair(&mut piece.normals, &piece.positions, &piece.indices);
+            if !lacking && repaired > 0 {
+                self.warnings.push(format!("{repaired} normals are zero or not finite, smooth ones instead"));
+            }
         }
         let mut assembly = Assembly::default();
         assembly.warnings = self.warnings;

@@ -37,6 +37,12 @@ pub(super) fn add(
         return Ok(());
     }
     transform(&mut piece, world_from_mesh, linear);
+    let repaired = normals::repair(&mut piece.normals, &piece.positions, &piece.indices);
+    if repaired > 0 {
+        assembly
+            .warnings
+            .push(format!("{place}: {repaired} normals are zero or not finite, smooth ones instead"));
+    }
     assembly.add(piece, material.slot, &place)
 }
 
@@ -193,20 +199,5 @@ fn transform(piece: &mut Piece, world_from_mesh: Mat4, linear: Mat3) {
     }
     if mirrored {
         piece.indices.chunks_exact_mut(3).for_each(|corners| corners.swap(1, 2));
-    }
-    repair_normals(piece);
-}
-
-/// Zero or non-finite normals of a file become the triangle's own.
-fn repair_normals(piece: &mut Piece) {
-    let broken = |normal: &Vec3| !normal.is_normalized();
-    if !piece.normals.iter().any(broken) {
-        return;
-    }
-    let smooth = normals::smooth(&piece.positions, &piece.indices);
-    for (normal, replacement) in piece.normals.iter_mut().zip(smooth) {
-        if broken(normal) {
-            *normal = replacement;
-        }
     }
 }
