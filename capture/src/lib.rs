@@ -12,7 +12,10 @@ pub mod images;
 pub mod latest;
 pub mod pixel_format;
 pub mod pool;
+pub mod recording;
 pub mod registry;
+pub mod replay;
+mod rosbag;
 
 pub use camera::{Camera, CaptureError, StreamInfo};
 pub use clock::Timestamp;

@@ -31,7 +31,12 @@ impl Packing {
 ///
 /// # Errors
 /// What is wrong. `out` then holds what could be unpacked before that.
-pub(crate) fn unpack(packing: Packing, packed: &mut Vec<u8>, size: u64, out: &mut Vec<u8>) -> Result<(), String> {
+pub(crate) fn unpack(
+    packing: Packing,
+    packed: &mut Vec<u8>,
+    size: u64,
+    out: &mut Vec<u8>,
+) -> Result<(), String> {
     out.clear();
     if size > MAX_CHUNK_BYTES {
         return Err(format!("a chunk of {size} bytes is refused, the limit is {MAX_CHUNK_BYTES}"));
@@ -41,7 +46,8 @@ pub(crate) fn unpack(packing: Packing, packed: &mut Vec<u8>, size: u64, out: &mu
             std::mem::swap(packed, out);
             Ok(())
         }
-        Packing::Lz4 => lz4::Decoder::new(packed.as_slice()).and_then(|decoder| read_some(decoder, size, packed.len(), out)),
+        Packing::Lz4 => lz4::Decoder::new(packed.as_slice())
+            .and_then(|decoder| read_some(decoder, size, packed.len(), out)),
         Packing::Zstd => zstd::stream::read::Decoder::with_buffer(packed.as_slice())
             .and_then(|decoder| read_some(decoder, size, packed.len(), out)),
         Packing::Bzip2 => read_some(bzip2::read::BzDecoder::new(packed.as_slice()), size, packed.len(), out),
@@ -92,7 +98,8 @@ mod tests {
 
     #[test]
     fn a_cut_chunk_gives_what_came_before_the_cut() {
-        let bytes: Vec<u8> = (0..1_000_000_u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+        let bytes: Vec<u8> =
+            (0..1_000_000_u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
         let mut packed = packed_zstd(&bytes);
         packed.truncate(packed.len() / 2);
         let mut out = Vec::new();

@@ -158,7 +158,8 @@ impl Source {
     pub(crate) fn read(&mut self, offset: u64, len: u64, into: &mut Vec<u8>) -> Result<(), RecordingError> {
         into.clear();
         let len = len.min(self.len.saturating_sub(offset));
-        self.try_read(offset, len, into).map_err(|source| RecordingError::Read { path: self.path.clone(), source })
+        self.try_read(offset, len, into)
+            .map_err(|source| RecordingError::Read { path: self.path.clone(), source })
     }
 
     fn try_read(&mut self, offset: u64, len: u64, into: &mut Vec<u8>) -> io::Result<()> {
