@@ -188,6 +188,21 @@ fn teapot_has_newells_measures() {
     assert_eq!(Topology::of(&mesh).open_edges.len(), 64 * (4 + 4 + 4 + 4));
 }
 
+/// A teapot tessellated by someone else with ten segments per patch (y up): same triangles, area and extent.
+#[test]
+fn teapot_is_the_one_everybody_has() {
+    let Some(path) = coshade_testdata::find("teapot_is_the_one_everybody_has", "meshes/teapot.obj") else {
+        return;
+    };
+    let theirs = crate::import(path).unwrap().mesh;
+    let ours = teapot(3.15, 10, TeapotLid::Open).unwrap();
+    assert_eq!(ours.triangle_count(), theirs.triangle_count());
+    // Their corners are rounded to 1e-6 of about 2.
+    assert_close(ours.area_m2(), theirs.area_m2(), ROUNDING, "area");
+    let (ours, theirs) = (ours.aabb().unwrap().size(), theirs.aabb().unwrap().size());
+    assert!((ours - Vec3::new(theirs.x, theirs.z, theirs.y)).abs().max_element() < 2e-6, "{ours} {theirs}");
+}
+
 /// `V = A₁ ∫ r² dz` over the outline of the pot; A₁ is the area inside the four Bézier quarters that stand for the unit
 /// circle. Both integrals are done here from the published outline.
 #[test]
