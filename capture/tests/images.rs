@@ -335,6 +335,21 @@ fn a_description_tells_layout_figures_and_problems() {
 }
 
 #[test]
+fn folders_called_depth_hold_depth_and_other_sixteen_bit_images_do_not() {
+    let folder = tempfile::tempdir().unwrap();
+    for n in 0..2 {
+        save(&grey_16(4, 2, 700), folder.path(), &format!("Depth/{n}.png"));
+        save(&grey_16(4, 2, 700), folder.path(), &format!("infrared/{n}.png"));
+    }
+    let found = describe(folder.path(), None).unwrap();
+    let formats: Vec<_> = found.series.iter().map(|series| series.format).collect();
+    assert_eq!(formats, [PixelFormat::Z16, PixelFormat::Y16]);
+    assert_eq!(found.problems, Vec::<String>::new());
+    let given = describe(&folder.path().join("infrared"), Some(0.001)).unwrap();
+    assert_eq!(given.series[0].depth.as_ref().unwrap().max_m, Some(0.713));
+}
+
+#[test]
 fn real_rgbd_sets_are_recognised_and_open() {
     let Some(root) = coshade_testdata::find("real_rgbd_sets_are_recognised_and_open", "rgbd") else { return };
     // Read with Pillow and NumPy: valid pixels of all; smallest, median and largest code.

@@ -139,7 +139,7 @@ pub fn describe(folder: &Path, depth_unit_m: Option<f64>) -> Result<Description,
             (None, true) => (0.001, UnitSource::Layout),
             (None, false) => (0.001, UnitSource::Assumed),
         };
-        let is_named_depth = file_name(pattern).to_ascii_lowercase().contains("depth");
+        let is_named_depth = files.iter().any(|file| is_named_depth(folder, file));
         let may_be_depth = depth_unit_m.is_some() || is_named_depth;
         series.extend(describe_series(pattern, files, may_be_depth.then_some(unit), &mut problems));
     }
@@ -244,6 +244,12 @@ fn is_seven_scenes(groups: &BTreeMap<String, Vec<PathBuf>>) -> bool {
         groups.keys().any(|pattern| file_name(pattern).starts_with("frame-") && pattern.contains(kind))
     };
     has(".color.") && has(".depth.")
+}
+
+/// Whether a file or the folder it is in, inside `folder`, is called depth.
+fn is_named_depth(folder: &Path, file: &Path) -> bool {
+    let inside = file.strip_prefix(folder).unwrap_or(file);
+    inside.to_string_lossy().to_ascii_lowercase().contains("depth")
 }
 
 fn file_name(pattern: &str) -> &str {
