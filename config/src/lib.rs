@@ -48,6 +48,7 @@ pub use key_path::{KeyPath, Step};
 pub use limits::MAX_FILE_BYTES;
 pub use page::reference_page;
 pub use problem::{Problem, Problems, Severity};
+pub use suggest::nearest;
 
 /// Reads a file; see [`Document::read`].
 pub fn read<T: DeserializeOwned + JsonSchema>(path: impl AsRef<Path>) -> Result<T, Error> {

@@ -1,7 +1,7 @@
 //! "Did you mean".
 
 /// The candidate closest to what was written, if any is close enough to be meant.
-pub(crate) fn nearest<'c>(written: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
+pub fn nearest<'c>(written: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
     // Distances cost the product of the lengths; nobody mistypes a name of a hundred letters.
     let written: String = written.chars().take(100).map(normal).collect();
     let scored = candidates.into_iter().filter_map(|candidate| {

@@ -13,6 +13,7 @@
 //! | [`normals`], [`tangents`], [`polygon`] | what a file leaves out: made here |
 //! | [`topology`] | whether a surface is closed |
 //! | [`validity`] | what is wrong with a mesh |
+//! | [`session`], [`rig`] | the session file and the rig file |
 //! | [`sample`] | points spread over surfaces |
 //!
 //! World: right-handed, +Z up, metres. Colours are linear RGB in the see-through camera's own primaries.
@@ -25,7 +26,9 @@ pub mod mesh;
 pub mod normals;
 pub mod polygon;
 pub mod pose;
+pub mod rig;
 pub mod sample;
+pub mod session;
 pub mod shape;
 pub mod tangents;
 pub mod texture;
@@ -40,6 +43,8 @@ pub use light::{Light, LightKind};
 pub use material::{AlphaMode, Material};
 pub use mesh::{Mesh, MeshError, Part};
 pub use pose::{Pose, Similarity};
+pub use rig::{Rig, RigSensor};
+pub use session::{Session, SessionSpec};
 pub use shape::{Shape, ShapeError};
 pub use texture::{ColorSpace, Image, Texture};
 pub use thing::{Scene, Thing};

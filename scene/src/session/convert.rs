@@ -1,0 +1,185 @@
+//! From the numbers of a session to the types of a scene: the only place where f64 becomes f32.
+
+use glam::{DQuat, DVec3, Vec2, Vec3};
+
+use super::Session;
+use super::placement::{AxisAngle, Placement, PoseSpec};
+use crate::pose::{Pose, Similarity};
+
+/// A quaternion off unit length by more is a mistake, not rounding.
+const UNIT_TOLERANCE: f64 = 1e-3;
+
+/// Why a placement is none.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PlacementError {
+    /// Two ways to say a rotation.
+    #[error("`{second}` beside `{first}`, of which only one is allowed")]
+    TwoRotations {
+        /// The one to keep.
+        first: &'static str,
+        /// The one too many.
+        second: &'static str,
+    },
+    /// A quaternion that is no rotation.
+    #[error("a quaternion of length {length}; unit length is needed")]
+    NotUnit {
+        /// Its length.
+        length: f64,
+    },
+    /// An axis of length zero.
+    #[error("an axis of length {length} has no direction")]
+    NoAxis {
+        /// Its length.
+        length: f64,
+    },
+}
+
+impl PlacementError {
+    /// The key that is wrong.
+    pub fn key(&self) -> &'static str {
+        match self {
+            Self::TwoRotations { second, .. } => second,
+            Self::NotUnit { .. } => "quaternion_xyzw",
+            Self::NoAxis { .. } => "axis_angle",
+        }
+    }
+}
+
+impl Placement {
+    /// `frame_from_thing`.
+    ///
+    /// # Errors
+    /// [`PlacementError`] names the key that is wrong.
+    pub fn similarity(&self) -> Result<Similarity, PlacementError> {
+        Ok(Similarity {
+            rotation: self.rotation()?.as_quat(),
+            translation_m: vec3(self.position_m),
+            scale: self.scale.unwrap_or(1.0) as f32,
+        })
+    }
+
+    /// In double precision.
+    ///
+    /// # Errors
+    /// As [`Placement::similarity`].
+    pub fn rotation(&self) -> Result<DQuat, PlacementError> {
+        let given = [
+            (self.rotation_deg.is_some(), "rotation_deg"),
+            (self.quaternion_xyzw.is_some(), "quaternion_xyzw"),
+            (self.axis_angle.is_some(), "axis_angle"),
+        ];
+        let mut names = given.into_iter().filter(|(given, _)| *given).map(|(_, name)| name);
+        if let (Some(first), Some(second)) = (names.next(), names.next()) {
+            return Err(PlacementError::TwoRotations { first, second });
+        }
+        match (self.rotation_deg, self.quaternion_xyzw, self.axis_angle) {
+            (Some(angles_deg), ..) => Ok(euler_xyz(angles_deg)),
+            (_, Some(quaternion), _) => unit_quaternion(quaternion),
+            (.., Some(axis_angle)) => around(axis_angle),
+            _ => Ok(DQuat::IDENTITY),
+        }
+    }
+}
+
+/// R = Rz·Ry·Rx.
+fn euler_xyz(angles_deg: [f64; 3]) -> DQuat {
+    let [x, y, z] = angles_deg.map(f64::to_radians);
+    DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x)
+}
+
+/// Normalised if it is nearly a unit quaternion.
+pub(crate) fn unit_quaternion(xyzw: [f64; 4]) -> Result<DQuat, PlacementError> {
+    let quaternion = DQuat::from_array(xyzw);
+    let length = quaternion.length();
+    if (length - 1.0).abs() <= UNIT_TOLERANCE {
+        Ok(quaternion / length)
+    } else {
+        Err(PlacementError::NotUnit { length })
+    }
+}
+
+fn around(AxisAngle { axis, angle_deg }: AxisAngle) -> Result<DQuat, PlacementError> {
+    let axis = DVec3::from_array(axis);
+    match axis.try_normalize() {
+        Some(unit) => Ok(DQuat::from_axis_angle(unit, angle_deg.to_radians())),
+        None => Err(PlacementError::NoAxis { length: axis.length() }),
+    }
+}
+
+impl Session {
+    /// A pose with the paths of its files resolved.
+    ///
+    /// # Errors
+    /// As [`Placement::similarity`].
+    pub fn pose(&self, spec: &PoseSpec) -> Result<Pose, PlacementError> {
+        let frame_from_thing = spec.placement().similarity()?;
+        Ok(match spec {
+            PoseSpec::World { .. } => Pose::World(frame_from_thing),
+            PoseSpec::Marker { tag, .. } => Pose::Marker {
+                family: tag.family.clone(),
+                id: tag.id,
+                size_m: tag.size_m as f32,
+                marker_from_thing: frame_from_thing,
+            },
+            PoseSpec::Body { body, .. } => {
+                Pose::Body { body: self.resolve(body), body_from_thing: frame_from_thing }
+            }
+            PoseSpec::Board { board, .. } => {
+                Pose::Board { board: self.resolve(board), board_from_thing: frame_from_thing }
+            }
+        })
+    }
+}
+
+pub(crate) fn vec3(numbers: [f64; 3]) -> Vec3 {
+    DVec3::from_array(numbers).as_vec3()
+}
+
+pub(crate) fn vec2([x, y]: [f64; 2]) -> Vec2 {
+    Vec2::new(x as f32, y as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn turned(placement: &Placement, v: Vec3) -> Vec3 {
+        placement.similarity().unwrap().transform_direction(v)
+    }
+
+    #[test]
+    fn euler_angles_turn_about_fixed_x_then_y_then_z() {
+        let placement = Placement { rotation_deg: Some([90.0, 0.0, 90.0]), ..Placement::default() };
+        // About x: y → z, about z: z stays. About x: z → −y, about z: −y → x.
+        assert!(turned(&placement, Vec3::Y).abs_diff_eq(Vec3::Z, 1e-6));
+        assert!(turned(&placement, Vec3::Z).abs_diff_eq(Vec3::X, 1e-6));
+        assert!(turned(&placement, Vec3::X).abs_diff_eq(Vec3::Y, 1e-6));
+    }
+
+    #[test]
+    fn the_three_ways_to_say_a_rotation_agree() {
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let ways = [
+            Placement { rotation_deg: Some([0.0, 0.0, 90.0]), ..Placement::default() },
+            Placement { quaternion_xyzw: Some([0.0, 0.0, half, half]), ..Placement::default() },
+            Placement {
+                axis_angle: Some(AxisAngle { axis: [0.0, 0.0, 7.0], angle_deg: 90.0 }),
+                ..Placement::default()
+            },
+        ];
+        for placement in ways {
+            assert!(turned(&placement, Vec3::X).abs_diff_eq(Vec3::Y, 1e-6), "{placement:?}");
+        }
+    }
+
+    #[test]
+    fn rounded_quaternions_are_normalised_and_others_refused() {
+        let with = |quaternion| Placement { quaternion_xyzw: Some(quaternion), ..Placement::default() };
+        assert!(with([0.0, 0.0, 0.7071, 0.7071]).similarity().unwrap().is_valid());
+        assert_eq!(
+            with([0.0, 0.0, 1.0, 1.0]).similarity(),
+            Err(PlacementError::NotUnit { length: std::f64::consts::SQRT_2 })
+        );
+        assert!(matches!(with([0.0; 4]).similarity(), Err(PlacementError::NotUnit { .. })));
+    }
+}
