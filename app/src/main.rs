@@ -1,6 +1,8 @@
 //! The `coshade` command line.
 
 mod command;
+mod interrupt;
+mod sources;
 
 use std::process::ExitCode;
 

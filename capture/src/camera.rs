@@ -40,6 +40,12 @@ pub trait Camera: Send {
         None
     }
 
+    /// Whether frames come whether or not they are taken, so that a slow reader loses some. False for files, which
+    /// wait for their reader.
+    fn is_live(&self) -> bool {
+        true
+    }
+
     /// The next frame, waiting at most `timeout`.
     ///
     /// # Errors

@@ -4,6 +4,7 @@ use std::fmt;
 
 use crate::camera::{Camera, CaptureError};
 use crate::images::{self, did_you_mean};
+use crate::replay;
 
 /// Opens what follows `scheme:` in the name of a source.
 pub type Opener = Box<dyn Fn(&str) -> Result<Box<dyn Camera>, CaptureError> + Send + Sync>;
@@ -30,6 +31,7 @@ impl SourceRegistry {
     pub fn builtin() -> Self {
         let mut registry = Self::new();
         registry.register("images", "images:photos/*.png?fps=30", Box::new(images::open));
+        registry.register("replay", "replay:desk.mcap#camera", Box::new(replay::open));
         registry
     }
 

@@ -58,6 +58,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let adapters = if loader.status == Status::Ok { adapter::list() } else { Vec::new() };
     let mut checks = vec![loader, vulkan_driver(), graphics_adapter(&adapters)];
     checks.extend(video_devices(Path::new("/dev")));
+    checks.push(runtime_folder());
     checks.push(processor());
     let report = Report { checks, adapters };
     if args.json {
@@ -175,6 +176,17 @@ fn video_devices(dev: &Path) -> Vec<Check> {
             }
         })
         .collect()
+}
+
+/// Vulkan drivers and windows keep their sockets there, and complain on standard error where it is missing.
+fn runtime_folder() -> Check {
+    const NAME: &str = "runtime folder";
+    const CURE: &str = "export XDG_RUNTIME_DIR=/run/user/$(id -u), or any folder of yours that only you can read";
+    match std::env::var_os("XDG_RUNTIME_DIR") {
+        Some(folder) if Path::new(&folder).is_dir() => Check::ok(NAME, folder.display().to_string()),
+        Some(folder) => Check::bad(NAME, Status::Warning, format!("{} is no folder", folder.display()), CURE),
+        None => Check::bad(NAME, Status::Warning, "XDG_RUNTIME_DIR is not set", CURE),
+    }
 }
 
 fn processor() -> Check {

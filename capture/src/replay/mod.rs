@@ -20,6 +20,7 @@ pub use camera::ReplayCamera;
 pub use options::{Rate, ReplayOptions, ReplaySource};
 pub use playback::Playback;
 
+use crate::camera::{Camera, CaptureError};
 use crate::recording::{Reader, RecordingError};
 
 /// Nanoseconds between frames if there are too few to tell.
@@ -27,6 +28,14 @@ const DEFAULT_INTERVAL_NS: u64 = 33_333_333;
 
 /// Frames that are looked at to find the rate.
 const PROBED_FRAMES: usize = 10;
+
+/// Opens what follows `replay:` in the name of a source.
+///
+/// # Errors
+/// As [`ReplayCamera::open`].
+pub fn open(rest: &str) -> Result<Box<dyn Camera>, CaptureError> {
+    Ok(Box::new(ReplayCamera::open(&format!("replay:{rest}"))?))
+}
 
 /// Mean time between the first frames of the first stream that has any; the reader is then at its start again.
 fn interval_ns(reader: &mut Reader) -> Result<u64, RecordingError> {

@@ -13,8 +13,9 @@ use coshade_lens::calibration::Calibration;
 use coshade_lens::pixel::RasterPx;
 use coshade_lens::raster::{OctahedralRaster, PinholeRaster, Raster};
 use coshade_lens::remap::RemapTable;
+use coshade_scene::rig::Rig;
 use image::{Rgb, RgbImage};
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
@@ -33,20 +34,20 @@ fn main() -> Result<()> {
     for (name, text) in [
         ("camera.toml", include_str!("camera.toml")),
         ("fisheye.toml", include_str!("fisheye.toml")),
+        ("rig.toml", include_str!("rig.toml")),
         ("session.toml", include_str!("session.toml")),
     ] {
         std::fs::create_dir_all(folder)?;
         std::fs::write(folder.join(name), text)?;
     }
-    let lenses = [
-        ("camera", Calibration::read(folder.join("camera.toml"))?, Rotation3::identity()),
-        // The fish-eye looks up where the camera looks ahead.
-        (
-            "fisheye",
-            Calibration::read(folder.join("fisheye.toml"))?,
-            Rotation3::from_axis_angle(&Vector3::x_axis(), -std::f64::consts::FRAC_PI_2),
-        ),
-    ];
+    let rig = Rig::read(folder.join("rig.toml"))?;
+    let sensor = |name: &'static str| -> Result<_> {
+        let rotation = rig.sensors.get(name).ok_or("a sensor that the rig lacks")?.rotation()?;
+        let rig_from_sensor = UnitQuaternion::from_quaternion(Quaternion::from(rotation.to_array()));
+        let calibration = Calibration::read(folder.join(format!("{name}.toml")))?;
+        Ok((name, calibration, rig_from_sensor.inverse().to_rotation_matrix()))
+    };
+    let lenses = [sensor("camera")?, sensor("fisheye")?];
     for (name, calibration, sensor_from_rig) in &lenses {
         std::fs::create_dir_all(folder.join(name))?;
         for index in 0..frames {

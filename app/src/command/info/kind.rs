@@ -1,0 +1,108 @@
+//! What a file is, by its first bytes where they tell, else by its name and keys.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use serde::Serialize;
+
+/// What a file is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// A folder of images.
+    Folder,
+    /// MCAP or ROS 1 bag.
+    Recording,
+    /// glTF, OBJ or PLY.
+    Mesh,
+    /// EXR, HDR, PNG or JPEG.
+    Image,
+    /// PGM or PPM.
+    DepthImage,
+    /// Calibration of a camera.
+    Calibration,
+    /// A session.
+    Session,
+    /// Where the sensors of a rig sit.
+    Rig,
+}
+
+impl Kind {
+    /// For people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Folder => "folder of images",
+            Self::Recording => "recording",
+            Self::Mesh => "mesh",
+            Self::Image => "image",
+            Self::DepthImage => "portable anymap image",
+            Self::Calibration => "camera calibration",
+            Self::Session => "session",
+            Self::Rig => "rig",
+        }
+    }
+}
+
+/// The kind of `path`.
+pub fn of(path: &Path) -> anyhow::Result<Kind> {
+    let about = std::fs::metadata(path).with_context(|| format!("{}", path.display()))?;
+    if about.is_dir() {
+        return Ok(Kind::Folder);
+    }
+    if !about.is_file() {
+        bail!("{}: not a regular file or folder", path.display());
+    }
+    let mut head = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(64).read_to_end(&mut head))
+        .with_context(|| format!("{}", path.display()))?;
+    if let Some(kind) = by_first_bytes(&head) {
+        return Ok(kind);
+    }
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    match ending.as_str() {
+        "mcap" | "bag" => Ok(Kind::Recording),
+        "glb" | "gltf" | "obj" | "ply" => Ok(Kind::Mesh),
+        "exr" | "hdr" | "png" | "jpg" | "jpeg" => Ok(Kind::Image),
+        "pgm" | "ppm" | "pnm" => Ok(Kind::DepthImage),
+        "toml" => by_keys(path),
+        _ => bail!(
+            "{}: not a kind of file that coshade knows (recordings .mcap .bag, settings .toml, meshes .glb .gltf .obj \
+             .ply, images .exr .hdr .png .jpg .pgm)",
+            path.display()
+        ),
+    }
+}
+
+fn by_first_bytes(head: &[u8]) -> Option<Kind> {
+    let kinds: [(&[u8], Kind); 9] = [
+        (b"\x89MCAP0\r\n", Kind::Recording),
+        (b"#ROSBAG", Kind::Recording),
+        (b"glTF", Kind::Mesh),
+        (b"ply\n", Kind::Mesh),
+        (b"ply\r\n", Kind::Mesh),
+        (b"\x76\x2f\x31\x01", Kind::Image),
+        (b"#?", Kind::Image),
+        (b"\x89PNG", Kind::Image),
+        (b"\xff\xd8\xff", Kind::Image),
+    ];
+    kinds.iter().find(|(magic, _)| head.starts_with(magic)).map(|&(_, kind)| kind)
+}
+
+/// Which of the TOML files it is, by keys that only one kind has. A file with none of them is taken for a session,
+/// whose reader then names what it does not know.
+fn by_keys(path: &Path) -> anyhow::Result<Kind> {
+    if std::fs::metadata(path)?.len() > coshade_config::MAX_FILE_BYTES {
+        bail!("{}: larger than {} MiB", path.display(), coshade_config::MAX_FILE_BYTES >> 20);
+    }
+    let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
+    let text = String::from_utf8_lossy(&bytes);
+    let has = |key: &str| text.lines().any(|line| line.trim_start().starts_with(key));
+    Ok(match () {
+        () if has("[lens]") || has("size_px") || has("[response]") => Kind::Calibration,
+        () if has("[sensor") => Kind::Rig,
+        () => Kind::Session,
+    })
+}
