@@ -20,7 +20,7 @@ use crate::write;
 /// A TOML file that was read: its value, and where everything stands in it.
 ///
 /// Crates that know more than types can say report what they find with [`Document::error_at`].
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Document<T> {
     source: Source,
     value: T,

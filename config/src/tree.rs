@@ -11,21 +11,21 @@ use crate::problem::Problem;
 use crate::source::Source;
 
 /// A value and where it stands: for a `[table]` its header, for an implied table the key that implies it.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Node {
     pub span: Range<usize>,
     pub value: Value,
 }
 
 /// A key of a table.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Entry {
     pub key: String,
     pub key_span: Range<usize>,
     pub node: Node,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) enum Value {
     String(String),
     /// `None` beyond 128 bits.

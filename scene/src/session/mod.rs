@@ -76,7 +76,7 @@ pub struct SessionSpec {
 }
 
 /// A session file: what it says, and where it says it.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Session {
     document: Document<SessionSpec>,
 }
@@ -144,12 +144,9 @@ impl Session {
     /// # Errors
     /// As [`Session::new`]; the session is then as before.
     pub fn set(&mut self, spec: &SessionSpec) -> Result<(), Error> {
-        let before = self.document.value().clone();
-        self.document.set(spec)?;
-        if let Err(error) = Document::<SessionSpec>::reject(check_content::problems(&self.document)) {
-            self.document.set(&before)?;
-            return Err(error);
-        }
+        let mut changed = self.document.clone();
+        changed.set(spec)?;
+        *self = Self::consistent(changed)?;
         Ok(())
     }
 
