@@ -143,6 +143,10 @@ impl Camera for ImagesCamera {
         &self.stream
     }
 
+    fn is_live(&self) -> bool {
+        false
+    }
+
     fn next_frame(&mut self, timeout: Duration) -> Result<Frame, CaptureError> {
         let source_name = self.name.clone();
         let Some((path, stamp)) = self.upcoming() else {
