@@ -1,5 +1,7 @@
 //! ROS 1 bags: a real one of an Intel RealSense D435, and small ones of every kind of chunk and image.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may panic")]
+
 mod support;
 
 use std::path::PathBuf;
@@ -91,7 +93,9 @@ fn image_encodings_are_mapped_or_named() {
         });
         read_all(&write(&folder, &bytes))
     };
-    let cases: [(&str, u32, &[u8], PixelFormat, &[u8]); 7] = [
+    // Encoding, stride, bytes; format and bytes of the frame.
+    type Case<'a> = (&'a str, u32, &'a [u8], PixelFormat, &'a [u8]);
+    let cases: [Case; 7] = [
         ("rgb8", 6, &[1, 2, 3, 4, 5, 6], PixelFormat::Rgb24, &[1, 2, 3, 4, 5, 6]),
         ("bgr8", 6, &[1, 2, 3, 4, 5, 6], PixelFormat::Rgb24, &[3, 2, 1, 6, 5, 4]),
         ("bgra8", 8, &[1, 2, 3, 9, 4, 5, 6, 9], PixelFormat::Rgb24, &[3, 2, 1, 6, 5, 4]),

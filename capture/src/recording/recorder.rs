@@ -224,8 +224,11 @@ fn obey(writer: &mut RecordingWriter, command: Command, shared: &Shared) -> Resu
             }
             match added {
                 Err(error @ RecordingError::Write { .. }) => Err(error),
-                // The caller may have given up waiting; then nobody wants the answer.
-                answer => Ok(drop(reply.try_send(answer))),
+                answer => {
+                    // The caller may have given up waiting; then nobody wants the answer.
+                    let _ = reply.try_send(answer);
+                    Ok(())
+                }
             }
         }
         Command::Frame { stream, frame, dropped_before } => {

@@ -33,10 +33,11 @@ pub(crate) const STREAM_END_RECORD: &str = "coshade.stream_end";
 pub enum Compression {
     /// Not at all: least CPU, largest files.
     None,
-    /// Fast. Depth shrinks to about a third; noisy camera images and MJPG hardly at all, and cost little.
+    /// Fast: 1.2 ms of CPU for a 640 × 480 depth frame, which shrinks to 0.39 of its size; uncompressed colour to 0.54
+    /// (both of a RealSense D435). MJPG does not shrink, and costs little.
     #[default]
     Lz4,
-    /// Smaller files, several times the CPU of lz4.
+    /// Smaller: 0.26 and 0.43 of the size for 1.4 times the CPU of lz4.
     Zstd,
 }
 

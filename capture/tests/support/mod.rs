@@ -58,8 +58,8 @@ pub fn frame(format: PixelFormat, index: u64) -> Frame {
     frame.arrived = frame.captured + Duration::from_nanos(random.below(5_000_000));
     // Numbers beyond 32 bits, with a gap every ten frames.
     frame.sequence = (1 << 40) + index + index / 10;
-    frame.exposure = (index % 3 != 0).then(|| Duration::from_nanos(random.below(50_000_000)));
-    frame.gain = (index % 4 != 0).then(|| random.below(1000) as f32 / 7.0);
+    frame.exposure = (!index.is_multiple_of(3)).then(|| Duration::from_nanos(random.below(50_000_000)));
+    frame.gain = (!index.is_multiple_of(4)).then(|| random.below(1000) as f32 / 7.0);
     frame.depth_unit_m = (format == PixelFormat::Z16).then_some(0.000_25 + index as f64 * 1e-9);
     let matrix = if index.is_multiple_of(2) { YuvMatrix::Bt709 } else { YuvMatrix::Bt601 };
     let range = if index.is_multiple_of(5) { YuvRange::Full } else { YuvRange::Limited };
