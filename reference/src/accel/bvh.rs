@@ -60,29 +60,49 @@ impl Bvh {
 
     /// The nearest hit within (t_min, t_max). `accept` is asked about triangles whose alpha decides.
     pub fn closest(&self, ray: &Ray, accept: impl Fn(u32, Vec3) -> bool) -> Option<Hit> {
-        self.traverse::<false>(ray, accept)
+        self.cast::<false>(ray, accept)
     }
 
     /// True if there is any hit within (t_min, t_max).
     pub fn occluded(&self, ray: &Ray, accept: impl Fn(u32, Vec3) -> bool) -> bool {
-        self.traverse::<true>(ray, accept).is_some()
+        self.cast::<true>(ray, accept).is_some()
     }
 
-    fn traverse<const ANY: bool>(&self, ray: &Ray, accept: impl Fn(u32, Vec3) -> bool) -> Option<Hit> {
+    fn cast<const ANY: bool>(&self, ray: &Ray, accept: impl Fn(u32, Vec3) -> bool) -> Option<Hit> {
+        let root = self.nodes.first()?;
         let slab = SlabRay::new(ray, self.extent_m);
+        // Most rays of a picture miss a small scene: they shall not pay for more than this.
+        if root.intersect(&slab, ray.t_min, ray.t_max).1 == 0 {
+            return None;
+        }
+        // One traversal for each main axis, so that the triangle test knows its axes at compile time.
         let sheared = ShearedRay::new(ray);
+        match sheared.main_axis() {
+            0 => self.traverse::<ANY, 0>(ray, &slab, &sheared, accept),
+            1 => self.traverse::<ANY, 1>(ray, &slab, &sheared, accept),
+            _ => self.traverse::<ANY, 2>(ray, &slab, &sheared, accept),
+        }
+    }
+
+    fn traverse<const ANY: bool, const Z: usize>(
+        &self,
+        ray: &Ray,
+        slab: &SlabRay,
+        sheared: &ShearedRay,
+        accept: impl Fn(u32, Vec3) -> bool,
+    ) -> Option<Hit> {
         let mut best: Option<Hit> = None;
         let mut t_max = ray.t_max;
         let mut stack = Stack::new();
-        let mut next = if self.nodes.is_empty() { None } else { Some(0) };
+        let mut next = Some(0);
         while let Some(child) = next {
             if child & LEAF == 0 {
                 let node = self.nodes.get(child as usize)?;
-                next = stack.descend(node, &slab, ray.t_min, t_max);
+                next = stack.descend::<ANY>(node, slab, ray.t_min, t_max);
                 continue;
             }
             let leaf = self.leaves.get((child & !LEAF) as usize)?;
-            if let Some(hit) = leaf.intersect(&sheared, ray.t_min, t_max, &accept) {
+            if let Some(hit) = leaf.intersect::<ANY, Z>(sheared, ray.t_min, t_max, &accept) {
                 if ANY {
                     return Some(hit);
                 }
@@ -112,14 +132,14 @@ impl Node {
 
 impl Leaf {
     #[inline(always)]
-    fn intersect(
+    fn intersect<const ANY: bool, const Z: usize>(
         &self,
         ray: &ShearedRay,
         t_min: f32,
         t_max: f32,
         accept: &impl Fn(u32, Vec3) -> bool,
     ) -> Option<Hit> {
-        let packet = self.triangles.intersect(ray, t_min, t_max);
+        let packet = self.triangles.intersect::<Z>(ray, t_min, t_max);
         let mut mask = packet.mask;
         let mut best: Option<Hit> = None;
         while mask != 0 {
@@ -135,6 +155,9 @@ impl Leaf {
                 Hit { t, triangle: number & !HAS_ALPHA, barycentric: Vec3::new(u[lane], v[lane], w[lane]) };
             if number & HAS_ALPHA == 0 || accept(hit.triangle, hit.barycentric) {
                 best = Some(hit);
+                if ANY {
+                    break;
+                }
             }
         }
         best
@@ -148,16 +171,14 @@ impl SlabRay {
         // Each corner's coordinates in the frame of the triangle test are off by less than eight roundings of |o| + |v|,
         // a plane's distance in the box test by less than four; ε is two roundings.
         let bound = 8.0 * f32::EPSILON * (ray.origin.abs().max_element() + extent_m);
-        let direction =
-            ray.direction.to_array().map(|part| if part.abs() < TINY { TINY.copysign(part) } else { part });
-        let origin = ray.origin.to_array();
-        let moved = |sign: f32| {
-            std::array::from_fn(|axis| Vec4::splat(origin[axis] + sign * bound.copysign(direction[axis])))
-        };
+        let tiny = Vec3::splat(TINY).copysign(ray.direction);
+        let direction = Vec3::select(ray.direction.abs().cmplt(Vec3::splat(TINY)), tiny, ray.direction);
+        let bound = Vec3::splat(bound).copysign(direction);
+        let lanes = |v: Vec3| v.to_array().map(Vec4::splat);
         Self {
-            origin: [moved(1.0), moved(-1.0)],
-            inverse: direction.map(|part| Vec4::splat(1.0 / part)),
-            near: direction.map(|part| usize::from(part < 0.0)),
+            origin: [lanes(ray.origin + bound), lanes(ray.origin - bound)],
+            inverse: lanes(direction.recip()),
+            near: direction.to_array().map(|part| usize::from(part < 0.0)),
         }
     }
 }
@@ -171,7 +192,7 @@ struct Stack {
 }
 
 impl Stack {
-    const FIXED: usize = 96;
+    const FIXED: usize = 48;
 
     fn new() -> Self {
         Self { entries: [(0, 0.0); Self::FIXED], length: 0, overflow: Vec::new() }
@@ -207,7 +228,13 @@ impl Stack {
 
     /// Goes on with the nearest child of a node, and leaves the others for later.
     #[inline(always)]
-    fn descend(&mut self, node: &Node, ray: &SlabRay, t_min: f32, t_max: f32) -> Option<u32> {
+    fn descend<const ANY: bool>(
+        &mut self,
+        node: &Node,
+        ray: &SlabRay,
+        t_min: f32,
+        t_max: f32,
+    ) -> Option<u32> {
         let (enter, mut mask) = node.intersect(ray, t_min, t_max);
         if mask == 0 {
             return self.pop(t_max);
@@ -219,7 +246,7 @@ impl Stack {
             let lane = mask.trailing_zeros() as usize & 3;
             mask &= mask - 1;
             let mut other = (node.child[lane], enter[lane]);
-            if other.1 < nearest.1 {
+            if !ANY && other.1 < nearest.1 {
                 std::mem::swap(&mut nearest, &mut other);
             }
             self.push(other.0, other.1);

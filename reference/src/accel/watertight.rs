@@ -20,7 +20,7 @@ pub struct TrianglePacket {
 /// A ray as the test wants it.
 #[derive(Clone, Copy, Debug)]
 pub struct ShearedRay {
-    axis: [usize; 3],
+    main_axis: usize,
     origin: [Vec4; 3],
     shear: [Vec4; 3],
 }
@@ -47,10 +47,10 @@ impl TrianglePacket {
         Self { corner: std::array::from_fn(|corner| std::array::from_fn(|axis| coordinate(corner, axis))) }
     }
 
-    /// Tests all four.
+    /// Tests all four. `Z` is the ray's [`ShearedRay::main_axis`].
     #[inline(always)]
-    pub fn intersect(&self, ray: &ShearedRay, t_min: f32, t_max: f32) -> PacketHit {
-        let [a, b, c] = self.corner.each_ref().map(|corner| ray.to_ray_frame(corner));
+    pub fn intersect<const Z: usize>(&self, ray: &ShearedRay, t_min: f32, t_max: f32) -> PacketHit {
+        let [a, b, c] = self.corner.each_ref().map(|corner| ray.to_ray_frame::<Z>(corner));
         let mut u = c[0] * b[1] - c[1] * b[0];
         let mut v = a[0] * c[1] - a[1] * c[0];
         let mut w = b[0] * a[1] - b[1] * a[0];
@@ -92,22 +92,25 @@ impl ShearedRay {
             2
         };
         let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-        let axis = [x, y, z];
         let along = direction[z];
         Self {
-            axis,
-            origin: axis.map(|axis| Vec4::splat(ray.origin[axis])),
+            main_axis: z,
+            origin: [x, y, z].map(|axis| Vec4::splat(ray.origin[axis])),
             shear: [direction[x] / along, direction[y] / along, 1.0 / along].map(Vec4::splat),
         }
     }
 
+    /// The axis along which the direction is largest.
+    pub fn main_axis(&self) -> usize {
+        self.main_axis
+    }
+
     #[inline(always)]
-    fn to_ray_frame(self, corner: &[Vec4; 3]) -> [Vec4; 3] {
-        let [x, y, z] = self.axis;
-        let depth = corner[z] - self.origin[2];
+    fn to_ray_frame<const Z: usize>(self, corner: &[Vec4; 3]) -> [Vec4; 3] {
+        let depth = corner[Z] - self.origin[2];
         [
-            corner[x] - self.origin[0] - self.shear[0] * depth,
-            corner[y] - self.origin[1] - self.shear[1] * depth,
+            corner[(Z + 1) % 3] - self.origin[0] - self.shear[0] * depth,
+            corner[(Z + 2) % 3] - self.origin[1] - self.shear[1] * depth,
             depth * self.shear[2],
         ]
     }
