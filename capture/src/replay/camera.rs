@@ -221,6 +221,10 @@ impl Camera for ReplayCamera {
         self.calibration.as_ref()
     }
 
+    fn is_live(&self) -> bool {
+        false
+    }
+
     fn next_frame(&mut self, timeout: Duration) -> Result<Frame, CaptureError> {
         let deadline = clock::now() + timeout;
         loop {
