@@ -1,6 +1,6 @@
 //! The reference page of a file's keys, made from its types.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
 
 use schemars::JsonSchema;
@@ -15,7 +15,8 @@ use crate::schema::{Keywords, Schema, map_values, properties, required, unions};
 /// a file that the test of the page should parse, too.
 pub fn reference_page<T: JsonSchema>(title: &str, example: &str) -> String {
     let schema = Schema::of::<T>();
-    let mut page = Page { schema: &schema, text: String::new(), anchors: HashMap::new() };
+    let mut page =
+        Page { schema: &schema, text: String::new(), anchors: HashMap::new(), written: HashSet::new() };
     page.line(&format!("# {title}\n"));
     page.line("*Generated from the types: change their docstrings, not this page.*\n");
     page.table(schema.root(), "");
@@ -42,6 +43,8 @@ struct Page<'s> {
     text: String,
     /// Sections by the schema they describe: a type that occurs twice is described once.
     anchors: HashMap<*const Keywords, String>,
+    /// Sections that are written: variants of a table may share a key.
+    written: HashSet<String>,
 }
 
 /// A key whose value is a table, or contains tables.
@@ -67,7 +70,8 @@ impl<'s> Page<'s> {
             let Some(identity) = self.identity(nested.schema) else {
                 continue;
             };
-            if self.anchors.get(&identity) == Some(&anchor(&nested.path)) {
+            let is_its_section = self.anchors.get(&identity) == Some(&anchor(&nested.path));
+            if is_its_section && self.written.insert(nested.path.clone()) {
                 let heading = format!("<a id=\"{}\"></a>\n## `{}`\n", anchor(&nested.path), nested.path);
                 self.line(&heading);
                 self.table(nested.schema, &nested.path);
@@ -113,11 +117,10 @@ impl<'s> Page<'s> {
             flat.iter().all(|variant| variant.iter().flat_map(|part| properties(part)).count() == 1);
         if one_key_each && distinguishing_keys(&flat).is_some() {
             self.line("One of these keys:\n");
-            let all: Vec<&'s Keywords> = flat.into_iter().flatten().collect();
-            return self.rows(&all, path, None);
+            return self.one_key_rows(&flat, path);
         }
-        for variant in tables {
-            self.variant("Either", variant, path, None);
+        for (number, variant) in tables.into_iter().enumerate() {
+            self.variant(if number == 0 { "Either" } else { "Or" }, variant, path, None);
         }
     }
 
@@ -138,15 +141,30 @@ impl<'s> Page<'s> {
         }
         self.line("| key | value | default | meaning |\n| --- | --- | --- | --- |");
         for (key, of) in shown {
-            let row = format!(
-                "| `{key}` | {} | {} | {} |",
-                cell(&self.value_words(key, of, path)),
-                cell(&default_words(of, needed.contains(&key))),
-                cell(&self.meaning(of)),
-            );
-            self.line(&row);
+            let default = default_words(of, needed.contains(&key));
+            let meaning = self.meaning(of);
+            self.row(key, of, path, &default, &meaning);
         }
         self.line("");
+    }
+
+    /// Of variants that each are one key: the docstring is the variant's.
+    fn one_key_rows(&mut self, variants: &[Vec<&'s Keywords>], path: &str) {
+        self.line("| key | value | default | meaning |\n| --- | --- | --- | --- |");
+        for variant in variants {
+            let text =
+                variant.iter().find_map(|keywords| keywords.get("description").and_then(Value::as_str));
+            for (key, of) in variant.iter().flat_map(|keywords| properties(keywords)).collect::<Vec<_>>() {
+                let meaning = text.map_or_else(|| self.meaning(of), one_line);
+                self.row(key, of, path, "one of these", &meaning);
+            }
+        }
+        self.line("");
+    }
+
+    fn row(&mut self, key: &str, of: &'s Value, path: &str, default: &str, meaning: &str) {
+        let value = self.value_words(key, of, path);
+        self.line(&format!("| `{key}` | {} | {} | {} |", cell(&value), cell(default), cell(meaning)));
     }
 
     fn value_words(&mut self, key: &str, of: &'s Value, path: &str) -> String {

@@ -1,5 +1,6 @@
 //! Every kind of problem, with the place and the words that a user gets.
 
+#![expect(clippy::panic, reason = "clippy knows only functions marked as tests as tests")]
 #![allow(dead_code, reason = "most fields are only read, to see what is refused")]
 
 use std::collections::BTreeMap;
@@ -341,21 +342,21 @@ fn other_crates_report_at_the_place_of_a_key() {
     let document: Document<Room> = Document::parse(text, "room.toml").unwrap();
     let place = |problem: Problem| (problem.line, problem.column, problem.key);
     assert_eq!(
-        place(document.error_at(&["camera", "size_px"], "no pixels", "")),
+        place(document.error_at(["camera", "size_px"], "no pixels", "")),
         (4, 11, "camera.size_px".to_owned())
     );
     assert_eq!(
-        place(document.error_at_key(&["camera", "size_px"], "no pixels", "")),
+        place(document.error_at_key(["camera", "size_px"], "no pixels", "")),
         (4, 1, "camera.size_px".to_owned())
     );
     assert_eq!(
-        place(document.error_at(&["camera", "size_px", "0"], "", "")),
+        place(document.error_at(["camera", "size_px", "0"], "", "")),
         (4, 12, "camera.size_px[0]".to_owned())
     );
-    assert_eq!(place(document.error_at(&["thing", "0", "name"], "", "")), (6, 8, "thing[0].name".to_owned()));
-    assert_eq!(place(document.error_at(&["thing", "0", "pose"], "", "")), (5, 1, "thing[0].pose".to_owned()));
-    assert_eq!(place(document.error_at(&["rig"], "", "")), (1, 1, "rig".to_owned()));
-    assert!(document.contains(&["camera", "source"]) && !document.contains(&["camera", "gain"]));
+    assert_eq!(place(document.error_at(["thing", "0", "name"], "", "")), (6, 8, "thing[0].name".to_owned()));
+    assert_eq!(place(document.error_at(["thing", "0", "pose"], "", "")), (5, 1, "thing[0].pose".to_owned()));
+    assert_eq!(place(document.error_at(["rig"], "", "")), (1, 1, "rig".to_owned()));
+    assert!(document.contains(["camera", "source"]) && !document.contains(["camera", "gain"]));
 }
 
 #[test]

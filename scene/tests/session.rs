@@ -323,13 +323,13 @@ fn lights_have_a_strength_and_a_cone() {
 #[test]
 fn materials_do_not_say_things_twice() {
     let text = format!(
-        "{SMALL}[[thing]]\nname = \"a\"\nworld = \"real\"\nmesh = \"a.glb\"\n[thing.material]\nroughness = 0.5\nphong_exponent = 3\nmetal_eta = [1, 1, 1]\nattenuation_color = [1, 1, 0.5]\n"
+        "{SMALL}[[thing]]\nname = \"a\"\nworld = \"real\"\nmesh = \"a.glb\"\n[thing.material]\nroughness = 0.5\nphong_exponent = 3\neta = [1, 1, 1]\nattenuation_color = [1, 1, 0.5]\n"
     );
     assert_eq!(
         errors(&text),
         [
             "12:18 thing[0].material.phong_exponent: `phong_exponent` beside `roughness`: both say how dull it is",
-            "13:13 thing[0].material.metal_eta: `metal_eta` without `metal_k`",
+            "13:7 thing[0].material.eta: `eta` without `k`",
             "14:21 thing[0].material.attenuation_color: one of two keys that only mean something together = \
              attenuation_color is the colour left after attenuation_distance_m",
         ]

@@ -1,7 +1,5 @@
 //! `docs/session.md` is made from the types. `UPDATE_DOCS=1 cargo test -p coshade-scene` rewrites it.
 
-#![expect(clippy::unwrap_used, reason = "clippy knows only functions marked as tests as tests")]
-
 use std::path::Path;
 
 use coshade_config::reference_page;

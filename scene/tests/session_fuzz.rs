@@ -1,7 +1,5 @@
 //! Damaged session files: an answer, soon, and a place for every problem.
 
-#![expect(clippy::panic, reason = "clippy knows only functions marked as tests as tests")]
-
 use coshade_config::Error;
 use coshade_scene::{Rig, Session};
 use coshade_testdata::mutate::mutations;

@@ -92,7 +92,7 @@ impl Assembly<'_> {
         };
         let (mesh, mut materials, warnings) = self.noted(made, &at.key(key))?;
         for warning in warnings {
-            self.warnings.push(self.session.document.error_at(&at.key(key), warning, "").warning());
+            self.warnings.push(self.session.document.error_at(at.key(key), warning, "").warning());
         }
         if let Some(change) = &spec.material {
             materials = materials.iter().map(|material| Arc::new(change.applied_to(material))).collect();
@@ -122,7 +122,8 @@ impl Assembly<'_> {
     fn shape(&self, spec: &ShapeSpec) -> Result<Made, ThingError> {
         let mesh = spec.shape().mesh()?;
         let materials = mesh.parts.iter().map(|part| part.material + 1).max().unwrap_or(1);
-        Ok((Arc::new(mesh), vec![Arc::new(Material::default()); materials], Vec::new()))
+        let material = Arc::new(Material::default());
+        Ok((Arc::new(mesh), std::iter::repeat_n(material, materials).collect(), Vec::new()))
     }
 
     fn light(&mut self, spec: &LightSpec, index: usize, at: &KeyPath) -> Option<Light> {
@@ -199,7 +200,7 @@ impl MaterialSpec {
     }
 
     fn change_base(&self, changed: &mut Material) {
-        let metal = self.metal_eta.zip(self.metal_k).map(|(eta, k)| {
+        let metal = self.eta.zip(self.k).map(|(eta, k)| {
             Vec3::from_array([0, 1, 2].map(|i: usize| {
                 let part = |of: [f64; 3]| of.get(i).copied().unwrap_or_default() as f32;
                 fresnel_f0(part(eta), part(k))

@@ -271,20 +271,12 @@ impl<'a> Check<'a> {
                 "",
             );
         }
-        if material.metal_eta.is_some() != material.metal_k.is_some() {
-            let (given, other) = if material.metal_eta.is_some() {
-                ("metal_eta", "metal_k")
-            } else {
-                ("metal_k", "metal_eta")
-            };
+        if material.eta.is_some() != material.k.is_some() {
+            let (given, other) = if material.eta.is_some() { ("eta", "k") } else { ("k", "eta") };
             self.error(&at.key(given), format!("`{given}` without `{other}`"), "");
         }
-        if material.metal_eta.is_some() && material.base_color.is_some() {
-            self.error(
-                &at.key("metal_eta"),
-                "`metal_eta` beside `base_color`: both say the metal's colour",
-                "",
-            );
+        if material.eta.is_some() && material.base_color.is_some() {
+            self.error(&at.key("eta"), "`eta` beside `base_color`: both say the metal's colour", "");
         }
         if material.attenuation_color.is_some() != material.attenuation_distance_m.is_some() {
             let given = if material.attenuation_color.is_some() {

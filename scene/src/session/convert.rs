@@ -1,9 +1,13 @@
 //! From the numbers of a session to the types of a scene: the only place where f64 becomes f32.
 
-use glam::{DQuat, DVec3, Vec2, Vec3};
+use std::f32::consts::FRAC_PI_2;
+
+use glam::{DQuat, DVec3, Quat, Vec2, Vec3};
 
 use super::Session;
 use super::placement::{AxisAngle, Placement, PoseSpec};
+use super::sensors::{FisheyeSpec, Mount};
+use super::tracking::{NamedUp, Up};
 use crate::pose::{Pose, Similarity};
 
 /// A quaternion off unit length by more is a mistake, not rounding.
@@ -131,6 +135,33 @@ impl Session {
     }
 }
 
+impl FisheyeSpec {
+    /// Where a fish-eye is that is fixed to the world; `None` if it is fixed to the rig. Without a pose the camera frame
+    /// is the world's: looking straight up, image right along world x.
+    pub fn pose_in_world(&self) -> Option<PoseSpec> {
+        match self.mount {
+            Mount::Rig => None,
+            Mount::World => Some(self.pose.clone().unwrap_or_default()),
+        }
+    }
+}
+
+impl Up {
+    /// `world_from_anchor`; `None` where it has to be found in the depth image or map.
+    ///
+    /// # Errors
+    /// As [`Placement::similarity`].
+    pub fn world_from_anchor(&self) -> Result<Option<Similarity>, PlacementError> {
+        match self {
+            Self::Named(NamedUp::Z) => Ok(Some(Similarity::IDENTITY)),
+            // A quarter turn about x: the print's y becomes the world's z.
+            Self::Named(NamedUp::Y) => Ok(Some(Similarity::from_rotation(Quat::from_rotation_x(FRAC_PI_2)))),
+            Self::Named(NamedUp::Plane) => Ok(None),
+            Self::Pose(placement) => placement.similarity().map(Some),
+        }
+    }
+}
+
 pub(crate) fn vec3(numbers: [f64; 3]) -> Vec3 {
     DVec3::from_array(numbers).as_vec3()
 }
@@ -157,6 +188,16 @@ mod tests {
     }
 
     #[test]
+    fn a_standing_print_has_its_y_upwards_and_faces_against_the_worlds_y() {
+        let world_from_anchor = Up::Named(NamedUp::Y).world_from_anchor().unwrap().unwrap();
+        assert!(world_from_anchor.transform_direction(Vec3::Y).abs_diff_eq(Vec3::Z, 1e-6));
+        assert!(world_from_anchor.transform_direction(Vec3::Z).abs_diff_eq(-Vec3::Y, 1e-6));
+        assert!(world_from_anchor.transform_direction(Vec3::X).abs_diff_eq(Vec3::X, 1e-6));
+        assert_eq!(Up::Named(NamedUp::Plane).world_from_anchor(), Ok(None));
+        assert_eq!(Up::default().world_from_anchor(), Ok(Some(Similarity::IDENTITY)));
+    }
+
+    #[test]
     fn the_three_ways_to_say_a_rotation_agree() {
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let ways = [
@@ -175,7 +216,7 @@ mod tests {
     #[test]
     fn rounded_quaternions_are_normalised_and_others_refused() {
         let with = |quaternion| Placement { quaternion_xyzw: Some(quaternion), ..Placement::default() };
-        assert!(with([0.0, 0.0, 0.7071, 0.7071]).similarity().unwrap().is_valid());
+        assert!(with([0.0, 0.0, 0.6004, 0.8]).similarity().unwrap().is_valid());
         assert_eq!(
             with([0.0, 0.0, 1.0, 1.0]).similarity(),
             Err(PlacementError::NotUnit { length: std::f64::consts::SQRT_2 })

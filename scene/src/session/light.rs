@@ -21,6 +21,7 @@ pub struct LightSpec {
     pub pose: PoseSpec,
     /// Measure its strength from the fish-eye image instead of giving it. Real lights only.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[schemars(extend("default" = false))]
     pub fit: bool,
     /// Its form and strength.
     #[serde(flatten)]

@@ -83,6 +83,7 @@ pub struct Tag {
 pub struct Placement {
     /// Where its origin is.
     #[serde(default, skip_serializing_if = "is_origin")]
+    #[schemars(extend("default" = [0, 0, 0]))]
     pub position_m: [f64; 3],
     /// Turned about the fixed x axis first, then about the fixed y, then about the fixed z axis: R = Rz·Ry·Rx
     /// (Blender's "XYZ Euler").

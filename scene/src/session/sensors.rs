@@ -23,7 +23,7 @@ pub struct CameraSpec {
 
 /// Settings that a session fixes, so that the radiance of its images stays comparable. Those left out are locked at what
 /// the device has chosen when the session starts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Controls {
     /// Image size to ask for, width and height.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -51,7 +51,22 @@ pub struct Controls {
     /// Hold exposure, gain, white balance and focus. `false` leaves them to the device; every frame is then compensated,
     /// which is less exact.
     #[serde(default = "yes", skip_serializing_if = "Clone::clone")]
+    #[schemars(extend("default" = true))]
     pub lock: bool,
+}
+
+impl Default for Controls {
+    fn default() -> Self {
+        Self {
+            size_px: None,
+            frames_per_second: None,
+            exposure_s: None,
+            gain: None,
+            white_balance_k: None,
+            focus_steps: None,
+            lock: true,
+        }
+    }
 }
 
 /// The fish-eye camera that sees where the light comes from.
@@ -95,10 +110,12 @@ pub struct EnvironmentSpec {
     pub file: PathBuf,
     /// Turns it around the world's z axis, counter-clockwise seen from above.
     #[serde(default, skip_serializing_if = "is_zero")]
+    #[schemars(extend("default" = 0))]
     pub yaw_deg: f64,
     /// Factor from the image's values to radiance (1 = code white of the see-through camera at its calibration
     /// exposure). Higher: more light.
     #[serde(default = "one", skip_serializing_if = "is_one")]
+    #[schemars(extend("default" = 1))]
     #[schemars(range(min = 0.0))]
     pub scale: f64,
     /// How far away the light is. Left out: infinitely far.

@@ -27,6 +27,7 @@ pub struct ThingSpec {
     pub material: Option<MaterialSpec>,
     /// Paint over the tag that it is attached to.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[schemars(extend("default" = false))]
     pub hide_marker: bool,
     /// Which axis of an `.obj` or `.ply` file points up; glTF files say it themselves.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -121,14 +122,14 @@ pub struct MaterialSpec {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     pub phong_exponent: Option<f64>,
-    /// Instead of `base_color`: refractive index of a metal for red, green and blue; needs `metal_k`.
+    /// Instead of `base_color`: refractive index of a metal for red, green and blue; needs `k`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = 0.0)))]
-    pub metal_eta: Option<[f64; 3]>,
-    /// Extinction coefficient of a metal for red, green and blue; needs `metal_eta`.
+    pub eta: Option<[f64; 3]>,
+    /// Extinction coefficient of a metal for red, green and blue; needs `eta`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = 0.0)))]
-    pub metal_k: Option<[f64; 3]>,
+    pub k: Option<[f64; 3]>,
     /// Share of the light entering a dielectric that passes through: 1 for glass.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0))]

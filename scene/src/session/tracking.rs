@@ -17,6 +17,7 @@ pub struct TrackingSpec {
     pub tags: Vec<Tag>,
     /// Take jitter out of measured poses. Never predicts: the image that was tracked is the one that is drawn into.
     #[serde(default = "yes", skip_serializing_if = "Clone::clone")]
+    #[schemars(extend("default" = true))]
     pub filter: bool,
 }
 
