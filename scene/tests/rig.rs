@@ -1,7 +1,5 @@
 //! The rig file.
 
-#![expect(clippy::unwrap_used, reason = "clippy knows only functions marked as tests as tests")]
-
 use std::collections::BTreeMap;
 
 use coshade_scene::rig::RigProvenance;
