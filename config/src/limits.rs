@@ -15,7 +15,8 @@ const MAX_BRACKETS: usize = 32;
 const MAX_KEY_PARTS: usize = 16;
 /// Most levels of a document, dotted keys and brackets together.
 pub(crate) const MAX_DEPTH: usize = 64;
-/// Most keys, array elements and headers together: each costs the parser some hundred bytes.
+/// Most keys, array elements, headers and points (of dotted keys and of decimal numbers, which look alike here)
+/// together: each costs the parsers up to some hundred bytes.
 const MAX_VALUES: usize = 500_000;
 
 /// A regular file's text.
@@ -108,7 +109,7 @@ impl Counts {
             return Err(format!("key of more than {MAX_KEY_PARTS} parts"));
         }
         if self.values > MAX_VALUES {
-            return Err(format!("more than {MAX_VALUES} values"));
+            return Err(format!("more than {MAX_VALUES} values (a decimal point counts as one)"));
         }
         Ok(())
     }
