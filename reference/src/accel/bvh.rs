@@ -17,6 +17,8 @@ use super::watertight::{ShearedRay, TrianglePacket};
 const HAS_ALPHA: u32 = 1 << 31;
 /// Children carry this bit where they are leaves.
 const LEAF: u32 = 1 << 31;
+/// A leaf that is not there.
+const NO_CHILD: u32 = u32::MAX;
 
 /// Boxes of up to four children; unused ones are inside out.
 #[derive(Clone, Copy, Debug)]
@@ -101,7 +103,10 @@ impl Bvh {
                 next = stack.descend::<ANY>(node, slab, ray.t_min, t_max);
                 continue;
             }
-            let leaf = self.leaves.get((child & !LEAF) as usize)?;
+            let Some(leaf) = self.leaves.get((child & !LEAF) as usize) else {
+                next = stack.pop(t_max);
+                continue;
+            };
             if let Some(hit) = leaf.intersect::<ANY, Z>(sheared, ray.t_min, t_max, &accept) {
                 if ANY {
                     return Some(hit);

@@ -3,11 +3,11 @@
 //! In the spirit of C. Wächter and N. Binder, *A Fast and Robust Method for Avoiding Self-Intersection* (Ray Tracing
 //! Gems, 2019, ch. 6), but with a distance that follows from the arithmetic. The watertight test computes the height of
 //! the origin over a triangle's plane with an error of a few ulps of the largest number involved: the coordinates of the
-//! point (they are subtracted) and the extent of the triangle (its corners are weighted). An offset of [`SAFETY`] ulps of
+//! point (they are subtracted) and the extent of the triangle (its corners are weighted). An offset of 32 ulps of
 //! both keeps an origin on its own side of its own triangle and of its neighbours in the same plane.
 //!
 //! In a concave edge the same rounding could put the point behind the neighbouring wall. So points are also kept away
-//! from the edges of their triangle, by [`EDGE_SAFETY`] such offsets, which is enough for wedges down to about 28°.
+//! from the edges of their triangle, by four such offsets, which is enough for wedges down to about 28°.
 
 use glam::Vec3;
 

@@ -178,3 +178,6 @@ fn choose(u: f32, p: f32) -> (bool, f32) {
     const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
     if u < p { (true, (u / p).min(BELOW_ONE)) } else { (false, ((u - p) / (1.0 - p)).min(BELOW_ONE)) }
 }
+
+#[cfg(test)]
+mod tests;

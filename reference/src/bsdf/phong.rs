@@ -111,7 +111,7 @@ impl Phong {
 fn lobe(wo: Vec3, wi: Vec3, n: f32) -> f32 {
     let half_chord2 = (wi - Vec3::new(-wo.x, -wo.y, wo.z)).length_squared() / 2.0;
     if half_chord2 >= 1.0 {
-        return if n > 0.0 { 0.0 } else { 1.0 };
+        return 0.0;
     }
     (n * (-half_chord2).ln_1p()).exp()
 }

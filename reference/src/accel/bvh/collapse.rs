@@ -11,7 +11,7 @@ use obvhs::triangle::Triangle;
 
 use super::super::geometry::Geometry;
 use super::super::watertight::TrianglePacket;
-use super::{Bvh, HAS_ALPHA, LEAF, Leaf, Node};
+use super::{Bvh, HAS_ALPHA, LEAF, Leaf, NO_CHILD, Node};
 
 /// Leaves hold up to four triangles, as many as are tested at once, and are worth filling.
 const BUILD: BvhBuildParams = BvhBuildParams { max_prims_per_leaf: 4, ..BvhBuildParams::medium_build() };
@@ -113,8 +113,9 @@ fn four_children<'b>(binary: &'b Bvh2, node: &'b Bvh2Node) -> Vec<&'b Bvh2Node> 
     children
 }
 
-/// Boxes that are inside out: entered at infinity, from wherever.
-const EMPTY_NODE: Node = Node { plane: [[Vec4::INFINITY, Vec4::NEG_INFINITY]; 3], child: [0; 4] };
+/// Boxes that are inside out: entered at infinity, from wherever. Should a ray of absurd numbers enter one, it finds no
+/// leaf.
+const EMPTY_NODE: Node = Node { plane: [[Vec4::INFINITY, Vec4::NEG_INFINITY]; 3], child: [NO_CHILD; 4] };
 
 fn set_child(node: &mut Node, lane: usize, child: &Bvh2Node, number: u32) {
     let bounds = child.aabb();
