@@ -2,7 +2,8 @@
 
 /// Numbers 0 … n−1 with given weights.
 ///
-/// Inversion keeps the order of the random numbers, and so their stratification (an alias table would not).
+/// Inversion keeps the order of the random numbers, and so their stratification (an alias table would not). Random
+/// numbers have 24 bits: probabilities below about 1e-6 are met to a few per cent only.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Discrete {
     /// `cdf[i]` = probability of a number ≤ i; the last is 1.

@@ -146,7 +146,12 @@ impl Lamp {
             Shape::Disc(spot) => disc(u2) * spot.radius_m,
             Shape::Rectangle(rectangle) => (u2 - 0.5) * rectangle.size_m,
         };
-        self.center + self.frame.tangent * local.x + self.frame.bitangent * local.y
+        // A lamp may lie on a surface, which must not shade it: see `accel::offset`.
+        let offset_m = 32.0 * f32::EPSILON * (self.center.abs().max_element() + self.radius_m());
+        self.center
+            + self.frame.tangent * local.x
+            + self.frame.bitangent * local.y
+            + self.frame.normal * offset_m
     }
 
     fn seen_from(&self, from: Vec3, position: Vec3) -> Option<LampPoint> {

@@ -108,3 +108,43 @@ fn discrete_draws_follow_weights() {
             && Discrete::new([-1.0]).is_none()
     );
 }
+
+/// A lamp stuck on a real wall: the wall does not shade it, neither towards the room nor for its photons.
+#[test]
+fn a_lamp_on_a_wall_shines_into_the_room() {
+    use crate::accel::{Accel, Sees};
+    for distance_m in [0.0, 1.0, 100.0] {
+        let pose = Pose::World(Similarity {
+            rotation: glam::Quat::from_euler(glam::EulerRot::XYZ, 0.4, 0.9, 0.2),
+            translation_m: Vec3::new(1.0, -0.7, 0.3) * distance_m,
+            scale: 1.0,
+        });
+        let wall = coshade_scene::Thing {
+            name: "wall".into(),
+            world: World::Real,
+            mesh: std::sync::Arc::new(coshade_scene::shape::plane(Vec2::splat(3.0)).unwrap()),
+            materials: vec![std::sync::Arc::default()],
+            pose: pose.clone(),
+            hide_marker: false,
+        };
+        let scene =
+            Scene { things: vec![wall], lights: vec![Described { pose: pose.clone(), ..disc_light(0.1) }] };
+        let accel = Accel::build(&scene, |_| None).unwrap();
+        let lights = Lights::build(&scene, accel.geometry(), None, |_| None).unwrap();
+        for index in 0..2000 {
+            let mut sampler = crate::random::Sampler::of_sequence(index, 8);
+            let local = sample_cosine_hemisphere(sampler.next_2d()) + Vec3::Z * 0.1;
+            let from = pose.resolve(|_| None).unwrap().transform_point(local);
+            if let Some(sample) = lights.sample(accel.geometry(), from, 0.5, sampler.next_2d()) {
+                assert!(
+                    !accel.occluded(&sample.shadow_ray(from, 0), Sees::Everything),
+                    "{distance_m} m away"
+                );
+            }
+            let photon =
+                lights.sample_emission(accel.geometry(), 0.5, sampler.next_2d(), sampler.next_2d()).unwrap();
+            let ray = Ray::new(photon.origin, photon.direction, 0);
+            assert!(!accel.occluded(&ray, Sees::Everything), "{distance_m} m away");
+        }
+    }
+}
