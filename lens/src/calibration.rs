@@ -3,6 +3,10 @@
 //! A `camera.toml` holds the lens, the response, vignetting and noise of a camera at one image size, and how they
 //! were found. It is data with its evaluation; what finds the numbers lives elsewhere.
 
+mod mistake;
+mod provenance;
+mod scale;
+
 use std::path::Path;
 
 use coshade_config::Document;
@@ -10,15 +14,15 @@ use nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use crate::calibration_mistake::Mistake;
-pub use crate::calibration_provenance::Provenance;
-pub use crate::calibration_scale::ScaleWarning;
 use crate::model::{CameraModel, ModelError, ModelKind};
 pub use crate::noise::{Noise, NoiseAtGain};
 use crate::pixel::CameraPx;
 use crate::raster::{CameraRaster, ImageCircle, MAX_SIDE_PX, RasterError};
 pub use crate::response::{Channel, Response, ResponseTable};
 pub use crate::vignetting::Vignetting;
+pub use mistake::Mistake;
+pub use provenance::Provenance;
+pub use scale::ScaleWarning;
 
 /// The version of the file's keys that this program reads and writes.
 pub const VERSION: u32 = 1;

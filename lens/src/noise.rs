@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::calibration_mistake::Mistake;
+use crate::calibration::Mistake;
 use crate::vignetting::interpolate;
 
 /// The variance of a pixel's linear light x: `shot`·x + `read`, in units of code white squared, before vignetting is

@@ -4,15 +4,19 @@
 //! rasters that take part in one remap table share one *frame*; each holds the rotation from that frame to its own
 //! axes, so that a virtual view or a map can be turned against the camera.
 
+mod camera;
+mod pinhole;
+mod sphere;
+
 use nalgebra::{Rotation3, Vector2, Vector3};
 use rayon::prelude::*;
 
-use crate::calibration_mistake::Mistake;
+use crate::calibration::Mistake;
 use crate::octahedral;
 use crate::pixel::RasterPx;
-pub use crate::raster_camera::{CameraRaster, ImageCircle};
-pub use crate::raster_pinhole::PinholeRaster;
-pub use crate::raster_sphere::{LatLongRaster, OctahedralRaster};
+pub use camera::{CameraRaster, ImageCircle};
+pub use pinhole::PinholeRaster;
+pub use sphere::{LatLongRaster, OctahedralRaster};
 
 /// The largest width or height of a raster, in pixels.
 pub const MAX_SIDE_PX: u32 = 16384;

@@ -18,6 +18,9 @@
 //! solid angles of the source's pixels) and 7 ms to apply to RGB; it has 2.0 million entries of 8 bytes. To 256²:
 //! 0.45 s, 1.4 million entries. A camera of 640×480 to a pinhole of that size: 0.6 s, 2.5 million entries.
 
+mod clip;
+mod outline;
+
 use std::collections::HashMap;
 
 use nalgebra::Vector2;
@@ -25,8 +28,8 @@ use rayon::prelude::*;
 
 use crate::pixel::RasterPx;
 use crate::raster::Raster;
-use crate::remap_clip::{Clipper, Moments, Polygon, moments};
-use crate::remap_outline::{Edge, Quad, Sample, Tracer};
+use clip::{Clipper, Moments, Polygon, moments};
+use outline::{Edge, Quad, Sample, Tracer};
 
 /// Texel rows that one task works off; neighbouring rows share their edges.
 const BAND_ROWS: u32 = 16;

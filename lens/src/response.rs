@@ -7,7 +7,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::calibration_mistake::Mistake;
+use crate::calibration::Mistake;
 
 /// A colour channel of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::calibration_mistake::Mistake;
+use crate::calibration::Mistake;
 use crate::pixel::CameraPx;
 
 /// What arrives never counts as less than this, so the gain is at most 50.

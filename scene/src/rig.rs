@@ -50,7 +50,7 @@ pub struct RigProvenance {
     pub tool: String,
     /// Date and time, RFC 3339.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub date: Option<String>,
+    pub when: Option<String>,
     /// Images or recordings it was made from.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub images: Vec<String>,
@@ -60,7 +60,7 @@ pub struct RigProvenance {
     pub rms_px: Option<f64>,
     /// Anything else worth knowing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub note: Option<String>,
+    pub notes: Option<String>,
 }
 
 fn no_rotation() -> [f64; 4] {

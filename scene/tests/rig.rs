@@ -25,10 +25,10 @@ fn rig() -> Rig {
         sensors: BTreeMap::from([("camera".to_owned(), camera), ("fisheye".to_owned(), fisheye)]),
         provenance: Some(RigProvenance {
             tool: "coshade 0.1.0".to_owned(),
-            date: Some("2026-11-22T12:00:00Z".to_owned()),
+            when: Some("2026-11-22T12:00:00Z".to_owned()),
             images: vec!["desk.mcap".to_owned()],
             rms_px: Some(0.21),
-            note: None,
+            notes: None,
         }),
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::{Rotation3, Vector2, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::calibration_mistake::Mistake;
+use crate::calibration::Mistake;
 use crate::model::CameraModel;
 use crate::pixel::{CameraPx, RasterPx};
 use crate::raster::{RasterError, check_rotation, check_size, quad_solid_angle_sr};

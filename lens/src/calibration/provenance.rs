@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::calibration_mistake::Mistake;
+use crate::calibration::Mistake;
 
 /// Where the numbers come from, for people and for the quality report. Nothing here changes how images are processed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]

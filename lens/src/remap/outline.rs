@@ -7,7 +7,7 @@ use nalgebra::{Vector2, Vector3};
 
 use crate::pixel::RasterPx;
 use crate::raster::Raster;
-use crate::remap_clip::{Polygon, bounds};
+use crate::remap::clip::{Polygon, bounds};
 
 /// How far the middle of an edge may lie from its chord before the edge is divided. The middle is kept as a
 /// vertex, so the polyline itself is straight to a quarter of this: 1/128 px.
