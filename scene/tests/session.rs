@@ -214,6 +214,29 @@ fn light_comes_from_one_side_only() {
 }
 
 #[test]
+fn a_camera_stands_still_or_is_tracked() {
+    let text = "version = 1\n[camera]\nsource = \"sim:w.toml#c\"\npose = { in = \"POSE }\n[[light]]\nkind = \"spot\"\n\
+                world = \"real\"\nradiant_intensity = [1, 1, 1]\ncone_deg = [20, 30]\npose = { in = \"world\" }\n";
+    let still = session(&text.replace("POSE", "world\", look_at_m = [1, 0, 0]"));
+    let pose = still.pose(still.spec().camera.pose.as_ref().unwrap()).unwrap();
+    let ahead = pose.frame_from_thing().transform_direction(glam::Vec3::Z);
+    assert!((ahead - glam::Vec3::X).length() < 1e-6);
+    assert_eq!(
+        errors(&text.replace("POSE", "world\", scale = 2")),
+        ["4:32 camera.pose.scale: a camera has no scale = remove it"]
+    );
+    let tracked = text.replace("POSE", "marker\", family = \"tag36h11\", id = 1, size_m = 0.1")
+        + "[tracking]\nanchor = { family = \"tag36h11\", id = 1, size_m = 0.1 }\n";
+    assert_eq!(
+        errors(&tracked),
+        [
+            "4:8 camera.pose: a camera that stands still beside [tracking] = remove one of them",
+            "4:15 camera.pose.in: a camera that stands still is in the world = write in = \"world\"",
+        ]
+    );
+}
+
+#[test]
 fn names_are_unique() {
     let thing = "[[thing]]\nname = \"a\"\nworld = \"real\"\nmesh = \"a.glb\"\n";
     assert_eq!(
@@ -285,6 +308,10 @@ fn a_rotation_is_given_once_and_is_one() {
     assert_eq!(
         pose("axis_angle = { axis = [0, 0, 0], angle_deg = 3 }"),
         ["10:37 thing[0].pose.axis_angle: an axis of length 0 has no direction"]
+    );
+    assert_eq!(
+        pose("position_m = [1, 2, 3], look_at_m = [1, 2, 3]"),
+        ["10:60 thing[0].pose.look_at_m: its own position; there is no direction to look in"]
     );
     assert_eq!(
         pose("position_m = [0, 1e7, nan]"),

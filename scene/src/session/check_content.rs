@@ -42,6 +42,7 @@ impl<'a> Check<'a> {
     fn session(&mut self, spec: &'a SessionSpec) {
         self.sensors(spec);
         self.light_from_outside(spec);
+        self.still_camera(spec);
         self.tracking(spec);
         self.names("thing", spec.things.iter().map(|thing| Some(thing.name.as_str())));
         self.names("light", spec.lights.iter().map(|light| light.name.as_deref()));
@@ -94,6 +95,27 @@ impl<'a> Check<'a> {
         }
     }
 
+    fn still_camera(&mut self, spec: &'a SessionSpec) {
+        let Some(pose) = &spec.camera.pose else {
+            return;
+        };
+        let at = KeyPath::root().key("camera").key("pose");
+        if pose.is_tracked() {
+            self.error(&at.key("in"), "a camera that stands still is in the world", "write in = \"world\"");
+        }
+        if spec.tracking.is_some() {
+            self.error(&at, "a camera that stands still beside [tracking]", "remove one of them");
+        }
+        self.camera_pose(pose, &at);
+    }
+
+    fn camera_pose(&mut self, pose: &'a PoseSpec, at: &KeyPath) {
+        self.pose(pose, at);
+        if pose.placement().scale.is_some() {
+            self.error(&at.key("scale"), "a camera has no scale", "remove it");
+        }
+    }
+
     fn light_from_outside(&mut self, spec: &'a SessionSpec) {
         let root = KeyPath::root();
         if spec.environment.is_some() && spec.fisheye.is_some() {
@@ -142,10 +164,7 @@ impl<'a> Check<'a> {
             _ => {}
         }
         if let Some(pose) = &fisheye.pose {
-            self.pose(pose, &at.key("pose"));
-            if pose.placement().scale.is_some() {
-                self.error(&at.key("pose").key("scale"), "a camera has no scale", "remove it");
-            }
+            self.camera_pose(pose, &at.key("pose"));
         }
     }
 

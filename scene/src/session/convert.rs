@@ -2,7 +2,7 @@
 
 use std::f32::consts::FRAC_PI_2;
 
-use glam::{DQuat, DVec3, Quat, Vec2, Vec3};
+use glam::{DMat3, DQuat, DVec3, Quat, Vec2, Vec3};
 
 use super::Session;
 use super::placement::{AxisAngle, Placement, PoseSpec};
@@ -36,6 +36,9 @@ pub enum PlacementError {
         /// Its length.
         length: f64,
     },
+    /// Aimed at the place where it is.
+    #[error("its own position; there is no direction to look in")]
+    NoTarget,
 }
 
 impl PlacementError {
@@ -45,6 +48,7 @@ impl PlacementError {
             Self::TwoRotations { second, .. } => second,
             Self::NotUnit { .. } => "quaternion_xyzw",
             Self::NoAxis { .. } => "axis_angle",
+            Self::NoTarget => "look_at_m",
         }
     }
 }
@@ -71,15 +75,17 @@ impl Placement {
             (self.rotation_deg.is_some(), "rotation_deg"),
             (self.quaternion_xyzw.is_some(), "quaternion_xyzw"),
             (self.axis_angle.is_some(), "axis_angle"),
+            (self.look_at_m.is_some(), "look_at_m"),
         ];
         let mut names = given.into_iter().filter(|(given, _)| *given).map(|(_, name)| name);
         if let (Some(first), Some(second)) = (names.next(), names.next()) {
             return Err(PlacementError::TwoRotations { first, second });
         }
-        match (self.rotation_deg, self.quaternion_xyzw, self.axis_angle) {
+        match (self.rotation_deg, self.quaternion_xyzw, self.axis_angle, self.look_at_m) {
             (Some(angles_deg), ..) => Ok(euler_xyz(angles_deg)),
-            (_, Some(quaternion), _) => unit_quaternion(quaternion),
-            (.., Some(axis_angle)) => around(axis_angle),
+            (_, Some(quaternion), ..) => unit_quaternion(quaternion),
+            (_, _, Some(axis_angle), _) => around(axis_angle),
+            (.., Some(target_m)) => aimed(self.position_m.into(), target_m.into()),
             _ => Ok(DQuat::IDENTITY),
         }
     }
@@ -108,6 +114,16 @@ fn around(AxisAngle { axis, angle_deg }: AxisAngle) -> Result<DQuat, PlacementEr
         Some(unit) => Ok(DQuat::from_axis_angle(unit, angle_deg.to_radians())),
         None => Err(PlacementError::NoAxis { length: axis.length() }),
     }
+}
+
+/// +z towards the target, +x level, +y down.
+fn aimed(position_m: DVec3, target_m: DVec3) -> Result<DQuat, PlacementError> {
+    let ahead = (target_m - position_m).try_normalize().ok_or(PlacementError::NoTarget)?;
+    // Within a microradian of the vertical, level says nothing.
+    let level = ahead.cross(DVec3::Z);
+    let right = if level.length() < 1e-6 { DVec3::X } else { level.normalize() };
+    let down = ahead.cross(right).normalize();
+    Ok(DQuat::from_mat3(&DMat3::from_cols(down.cross(ahead), down, ahead)).normalize())
 }
 
 impl Session {
@@ -222,5 +238,28 @@ mod tests {
             Err(PlacementError::NotUnit { length: std::f64::consts::SQRT_2 })
         );
         assert!(matches!(with([0.0; 4]).similarity(), Err(PlacementError::NotUnit { .. })));
+    }
+
+    #[test]
+    fn what_is_aimed_looks_at_its_target_upright() {
+        let targets =
+            [[1.0, 0.0, 0.0], [-1.0, 2.0, -3.0], [0.0, 0.0, 5.0], [0.0, 0.0, -5.0], [0.3, -4.0, 0.1]];
+        for target in targets {
+            let position_m = [0.0, 0.0, 0.5];
+            let placement = Placement { position_m, look_at_m: Some(target), ..Placement::default() };
+            let rotation = placement.rotation().unwrap();
+            let ahead = (DVec3::from(target) - DVec3::from(position_m)).normalize();
+            assert!((rotation * DVec3::Z - ahead).length() < 1e-12, "{target:?}");
+            assert!((rotation * DVec3::X).z.abs() < 1e-12, "{target:?}: x is level");
+            assert!((rotation * DVec3::Y).z <= 1e-12, "{target:?}: y points down");
+            assert!((rotation.length() - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn nothing_looks_at_itself() {
+        let position_m = [1.0, 2.0, 3.0];
+        let placement = Placement { position_m, look_at_m: Some(position_m), ..Placement::default() };
+        assert_eq!(placement.rotation(), Err(PlacementError::NoTarget));
     }
 }

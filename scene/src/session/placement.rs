@@ -77,8 +77,8 @@ pub struct Tag {
     pub size_m: f64,
 }
 
-/// Place, orientation and size in a frame. At most one of `rotation_deg`, `quaternion_xyzw` and `axis_angle` is given;
-/// without any it is not turned.
+/// Place, orientation and size in a frame. At most one of `rotation_deg`, `quaternion_xyzw`, `axis_angle` and
+/// `look_at_m` is given; without any it is not turned.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Placement {
     /// Where its origin is.
@@ -95,6 +95,10 @@ pub struct Placement {
     /// An axis and the angle around it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis_angle: Option<AxisAngle>,
+    /// A point of the frame that its +z axis is aimed at: where a camera looks, where a lamp shines. Its +x axis is level
+    /// and its +y axis points down, so that a camera's image is upright; aimed straight up or down, +x is the frame's x.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub look_at_m: Option<[f64; 3]>,
     /// Factor on all lengths of the thing; 1 if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]

@@ -16,6 +16,10 @@ pub struct CameraSpec {
     /// Calibration file. Needed unless the source brings one along (`replay:`, `sim:`), and stronger than that one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<PathBuf>,
+    /// `world_from_camera` of a camera that stands still, on a tripod say: nothing is tracked then. Camera frame: x right,
+    /// y down, z forward.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose: Option<PoseSpec>,
     /// What the device is set to and held at.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub controls: Option<Controls>,
