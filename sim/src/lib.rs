@@ -1,1 +1,4 @@
-//! x
+//! Simulated sensors.
+pub mod path;
+pub mod pose;
+pub mod random;
