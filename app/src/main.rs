@@ -22,6 +22,7 @@ enum Command {
     Record(command::record::Args),
     Replay(command::replay::Args),
     Compare(command::compare::Args),
+    Reference(command::reference::Args),
     Doctor(command::doctor::Args),
 }
 
@@ -34,6 +35,7 @@ fn main() -> ExitCode {
         Command::Record(args) => command::record::run(&args),
         Command::Replay(args) => command::replay::run(&args),
         Command::Compare(args) => command::compare::run(&args),
+        Command::Reference(args) => command::reference::run(&args),
         Command::Doctor(args) => command::doctor::run(&args),
     };
     match result {

@@ -6,4 +6,5 @@ pub mod doctor;
 pub mod info;
 pub mod print;
 pub mod record;
+pub mod reference;
 pub mod replay;
