@@ -2,3 +2,5 @@
 pub mod path;
 pub mod pose;
 pub mod random;
+pub mod sensor;
+pub mod tracer;
