@@ -1,6 +1,10 @@
 //! Simulated sensors.
+pub mod cache;
+pub mod faults;
 pub mod path;
 pub mod pose;
 pub mod random;
+pub mod rolling_shutter;
 pub mod sensor;
+pub mod timing;
 pub mod tracer;
