@@ -7,10 +7,10 @@
 //! | [`environment`] | radiance from far away |
 //! | [`distribution`] | drawing by weight |
 //!
-//! A light is chosen by the luminance of its flux. All densities given out contain the probability of that choice.
+//! A light is chosen half by the luminance of its flux, half alike. All densities given out contain the probability of that choice.
 //!
-//! Lamps are seen by rays, from their front, but they are no triangles: ask [`Lights::hit_lamp`] besides
-//! [`crate::accel::Accel::closest`], and take the nearer. They hide nothing.
+//! Lamps are seen by rays, from their front, but they are no triangles: ask [`Lights::lamps_along`] besides
+//! [`crate::accel::Accel::closest`], up to what that hits. They hide nothing.
 
 pub mod distribution;
 pub mod environment;
@@ -156,8 +156,25 @@ impl Lights {
             (lights.len() as u32 - 1, environment)
         });
         let mut all = Self { lights, choice: None, light_of_triangle, environment, bounds };
-        all.choice = Discrete::new(all.lights.iter().map(|light| f64::from(all.power(light))));
+        all.choice = Discrete::new(all.choice_weights());
         Ok(all)
+    }
+
+    /// Half by flux, half alike for each lamp, all glowing surfaces together, and the environment: flux alone would
+    /// leave a small lamp near its surface to one sample in a hundred wherever the environment is bright.
+    fn choice_weights(&self) -> Vec<f64> {
+        let powers: Vec<f64> = self.lights.iter().map(|light| f64::from(self.power(light))).collect();
+        let total: f64 = powers.iter().sum();
+        let glows = |light: &Light| matches!(light, Light::Glow(_));
+        let of_glow: f64 =
+            self.lights.iter().zip(&powers).filter(|(light, _)| glows(light)).map(|(_, p)| p).sum();
+        let groups = powers.iter().zip(&self.lights).filter(|(p, light)| **p > 0.0 && !glows(light)).count()
+            + usize::from(of_glow > 0.0);
+        let alike = |light: &Light, power: f64| if glows(light) { power / of_glow } else { 1.0 };
+        let weight = |(light, &power): (&Light, &f64)| {
+            if power > 0.0 { power / total + alike(light, power) / groups as f64 } else { 0.0 }
+        };
+        self.lights.iter().zip(&powers).map(weight).collect()
     }
 
     /// How many lights there are; every glowing triangle is one.
@@ -170,7 +187,7 @@ impl Lights {
         self.choice.is_none()
     }
 
-    /// Chooses a light by its power and a point on it, as seen from `from`. `None` if that one sends nothing there.
+    /// Chooses a light and a point on it, as seen from `from`. `None` if that one sends nothing there.
     pub fn sample(&self, geometry: &Geometry, from: Vec3, u_light: f32, u2: Vec2) -> Option<LightSample> {
         let choice = self.choice.as_ref()?.sample(u_light);
         let probability = choice.probability as f32;
@@ -212,22 +229,26 @@ impl Lights {
 
     /// The nearest lamp whose front a ray meets within (t_min, t_max).
     pub fn hit_lamp(&self, ray: &Ray) -> Option<LampHit> {
-        let hit = |(number, light): (usize, &Light)| {
-            let Light::Lamp(lamp) = light else {
-                return None;
-            };
-            let (t, point) = lamp.hit(ray)?;
+        self.lamps_along(*ray).min_by(|a, b| a.t.total_cmp(&b.t))
+    }
+
+    /// All lamps whose fronts a ray meets within (t_min, t_max), in the order of the scene: they do not hide each other.
+    pub fn lamps_along(&self, ray: Ray) -> impl Iterator<Item = LampHit> {
+        // Lamps come first.
+        let lamps = self.lights.iter().enumerate().map_while(|(number, light)| match light {
+            Light::Lamp(lamp) => Some((number as u32, lamp)),
+            _ => None,
+        });
+        lamps.filter_map(move |(number, lamp)| {
+            let (t, point) = lamp.hit(&ray)?;
             Some(LampHit {
                 t,
                 radiance: point.radiance,
-                pdf: point.pdf_sr * self.probability(number as u32),
+                pdf: point.pdf_sr * self.probability(number),
                 world: lamp.world,
-                light: number as u32,
+                light: number,
             })
-        };
-        // Lamps come first.
-        let lamps = self.lights.iter().enumerate().take_while(|(_, light)| matches!(light, Light::Lamp(_)));
-        lamps.filter_map(hit).min_by(|a, b| a.t.total_cmp(&b.t))
+        })
     }
 
     /// Per steradian at `from`, of [`Lights::sample`] yielding the point at `position` of a glowing triangle; 0 if it does
