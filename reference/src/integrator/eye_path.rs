@@ -161,13 +161,8 @@ impl<'scene> EyePath<'scene> {
 
     /// Lamps along the ray, up to what it hits; they hide nothing, also not each other.
     fn add_lamps(&mut self, tip: &mut Tip, until_m: f32) {
-        let ray = tip.strand.ray;
-        loop {
-            let rest = Ray { t_min: tip.lamps_seen_to_m, t_max: until_m, ..ray };
-            let Some(lamp) = self.scene.lights().hit_lamp(&rest) else {
-                break;
-            };
-            tip.lamps_seen_to_m = lamp.t;
+        let rest = Ray { t_min: tip.lamps_seen_to_m, t_max: until_m, ..tip.strand.ray };
+        for lamp in self.scene.lights().lamps_along(rest) {
             let weight = self.emission_weight(tip, Emitter::Lamp, || lamp.pdf);
             let radiance = tip.strand.weight * tip.strand.transmittance(lamp.t) * lamp.radiance * weight;
             self.radiance.add(tip.strand.worlds.and(Worlds::of(lamp.world)), radiance);
