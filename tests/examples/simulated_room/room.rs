@@ -13,7 +13,8 @@ const WINDOW_RADIANCE: [f64; 3] = [1.6, 2.0, 2.6];
 pub fn radiance(position_m: &Vector3<f64>, direction: &Vector3<f64>) -> Vector3<f64> {
     let (wall, distance_m) = (0..3)
         .map(|axis| {
-            let to_wall = if direction[axis] > 0.0 { SIZE_M[axis] - position_m[axis] } else { -position_m[axis] };
+            let to_wall =
+                if direction[axis] > 0.0 { SIZE_M[axis] - position_m[axis] } else { -position_m[axis] };
             (2 * axis + usize::from(direction[axis] > 0.0), to_wall / direction[axis])
         })
         .filter(|(_, distance)| distance.is_finite())
@@ -35,7 +36,7 @@ fn surface(wall: usize, point: &Vector3<f64>) -> Vector3<f64> {
         return if bar { Vector3::repeat(0.08) } else { WINDOW_RADIANCE.into() };
     }
     let mut normal = Vector3::zeros();
-    normal[wall / 2] = if wall % 2 == 0 { 1.0 } else { -1.0 };
+    normal[wall / 2] = if wall.is_multiple_of(2) { 1.0 } else { -1.0 };
     albedo(wall, point).component_mul(&irradiance(point, &normal)) / std::f64::consts::PI
 }
 
@@ -46,7 +47,11 @@ fn albedo(wall: usize, point: &Vector3<f64>) -> Vector3<f64> {
         1 => ([0.20, 0.42, 0.50], [0.13, 0.30, 0.38], tile(point.y, point.z, 0.4)),
         2 => ([0.72, 0.36, 0.26], [0.60, 0.27, 0.19], tile(point.x, point.z, 0.4)),
         3 => ([0.78, 0.76, 0.70], [0.68, 0.66, 0.60], tile(point.x, point.z, 0.4)),
-        4 => ([0.48, 0.33, 0.21], [0.38, 0.25, 0.15], tile(point.x, point.y + 0.7 * (point.x / 0.2).floor(), 0.2)),
+        4 => (
+            [0.48, 0.33, 0.21],
+            [0.38, 0.25, 0.15],
+            tile(point.x, point.y + 0.7 * (point.x / 0.2).floor(), 0.2),
+        ),
         _ => ([0.85, 0.85, 0.83], [0.80, 0.80, 0.78], tile(point.x, point.y, 0.6)),
     };
     if first { light.into() } else { dark.into() }
