@@ -26,3 +26,8 @@ pub use latest::{LatestError, LatestReceiver, LatestSender, latest};
 pub use pixel_format::{ColorEncoding, PixelFormat, YuvMatrix, YuvRange};
 pub use pool::{FramePool, PixelBuffer, PixelBufferMut};
 pub use registry::{SourceRegistry, open};
+
+/// Any path as text, also where it is not UTF-8, which JSON could not hold.
+fn lossy_path<S: serde::Serializer>(path: &std::path::Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(&path.display())
+}

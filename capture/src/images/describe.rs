@@ -34,6 +34,7 @@ pub enum FolderLayout {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Description {
     /// The folder described.
+    #[serde(serialize_with = "crate::lossy_path")]
     pub folder: PathBuf,
     /// How its files belong together.
     pub layout: FolderLayout,
@@ -60,6 +61,8 @@ pub struct Series {
     pub format: PixelFormat,
     /// Depth statistics, `None` for images.
     pub depth: Option<DepthSummary>,
+    /// Smallest and largest value of 16 bit grey images as they are in the files, of the images read.
+    pub codes: Option<[u16; 2]>,
 }
 
 /// Where a depth unit comes from.
@@ -158,6 +161,28 @@ pub fn describe(folder: &Path, depth_unit_m: Option<f64>) -> Result<Description,
         problems.push(format!("{poses} pose files, which is not the number of frames"));
     }
     Ok(Description { folder: folder.into(), layout, series, poses, problems })
+}
+
+/// Looks at a single image; as [`describe`] does for a folder with nothing else in it.
+pub fn describe_file(file: &Path, depth_unit_m: Option<f64>) -> Description {
+    let mut problems = Vec::new();
+    let unit = match depth_unit_m {
+        Some(unit_m) => Some((unit_m, UnitSource::Given)),
+        None => file
+            .file_name()
+            .is_some_and(|name| name.to_string_lossy().to_ascii_lowercase().contains("depth"))
+            .then_some((0.001, UnitSource::Assumed)),
+    };
+    let pattern = file.to_string_lossy();
+    let series = describe_series(&pattern, &[file.to_owned()], unit, &mut problems);
+    let folder = file.parent().unwrap_or(Path::new("")).to_owned();
+    Description {
+        folder,
+        layout: FolderLayout::Images,
+        series: series.into_iter().collect(),
+        poses: 0,
+        problems,
+    }
 }
 
 fn describe_tum(folder: &Path, depth_unit_m: Option<f64>) -> Result<Description, DescribeError> {
@@ -263,20 +288,23 @@ fn describe_series(
     problems: &mut Vec<String>,
 ) -> Option<Series> {
     let probe = common_probe(files, problems)?;
-    let depth = unit.filter(|_| probe.format == PixelFormat::Y16).map(|(unit_m, unit_source)| {
-        let mut statistics = Statistics::of(files);
+    let mut statistics = (probe.format == PixelFormat::Y16).then(|| Statistics::of(files));
+    if let Some(statistics) = &mut statistics {
         problems.append(&mut statistics.problems);
+    }
+    let depth = unit.zip(statistics.as_ref()).map(|((unit_m, unit_source), statistics)| {
         let summary = statistics.summary(unit_m, unit_source);
-        check_depth(pattern, &summary, &statistics, problems);
+        check_depth(pattern, &summary, statistics, problems);
         summary
     });
+    let codes = statistics.and_then(|statistics| statistics.range());
     let uri = match &depth {
         Some(depth) => format!("images:{pattern}?depth_unit_m={}", depth.unit_m),
         None => format!("images:{pattern}"),
     };
     let format = if depth.is_some() { PixelFormat::Z16 } else { probe.format };
     let Probe { width_px, height_px, .. } = probe;
-    Some(Series { uri, frames: files.len(), width_px, height_px, format, depth })
+    Some(Series { uri, frames: files.len(), width_px, height_px, format, depth, codes })
 }
 
 /// Format and size of the first readable file; the others must have the same.
@@ -352,6 +380,13 @@ impl Statistics {
         self.share(self.counts.last().copied().unwrap_or(0))
     }
 
+    /// Smallest and largest code, 0 included.
+    fn range(&self) -> Option<[u16; 2]> {
+        let min = self.counts.iter().position(|count| *count > 0)?;
+        let max = self.counts.iter().rposition(|count| *count > 0)?;
+        Some([u16::try_from(min).ok()?, u16::try_from(max).ok()?])
+    }
+
     /// The code below which half of the valid pixels lie.
     fn median(&self) -> Option<usize> {
         let half = self.valid().div_ceil(2);
@@ -391,8 +426,8 @@ fn check_depth(pattern: &str, summary: &DepthSummary, statistics: &Statistics, p
         None if summary.frames_read > 0 => problems.push(format!("{name}: no pixel holds a depth")),
         // A room or a desk is between these.
         Some(median_m) if !(0.1..=8.0).contains(&median_m) => problems.push(format!(
-            "{name}: half of the depths are beyond {median_m:.2} m with a unit of {unit_m} m: is it another, such as \
-             0.0002 (TUM) or 0.001?"
+            "{name}: with a unit of {unit_m} m the median depth is {median_m:.2} m: is the unit another, such as {}?",
+            if median_m > 8.0 { "0.0002 (TUM) or 0.0001" } else { "0.001" }
         )),
         _ => {}
     }
@@ -415,7 +450,7 @@ fn compare_counts(series: &[Series], problems: &mut Vec<String>) {
     }
 }
 
-/// `*.pose.txt` files, or lines of `pose.txt` or `groundtruth.txt`.
+/// `*.pose.txt` files, or the poses in `pose.txt`, `poses.txt` or `groundtruth.txt`.
 fn count_poses(folder: &Path) -> usize {
     let names = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let single = names.filter(|entry| entry.file_name().to_string_lossy().ends_with(".pose.txt")).count();
@@ -424,17 +459,27 @@ fn count_poses(folder: &Path) -> usize {
     }
     let list = ["pose.txt", "poses.txt", "groundtruth.txt"].iter().find_map(|name| {
         let text = std::fs::read_to_string(folder.join(name)).ok()?;
-        Some(text.lines().filter(|line| !line.trim().is_empty() && !line.starts_with('#')).count())
+        Some(text.lines().filter(|line| is_pose(line)).count())
     });
     list.unwrap_or(0)
 }
 
+/// Position and quaternion, maybe behind a time; files of these names also hold other things.
+fn is_pose(line: &str) -> bool {
+    let values: Option<Vec<f64>> = line.split_whitespace().map(|word| word.parse().ok()).collect();
+    values.is_some_and(|values| matches!(values.len(), 7 | 8))
+}
+
 impl Series {
-    /// One line for people.
+    /// One line for people, without the source.
     pub fn line(&self) -> String {
-        let Self { frames, width_px, height_px, format, uri, .. } = self;
-        let depth = self.depth.as_ref().map(DepthSummary::line).unwrap_or_default();
-        format!("{frames} x {format} {width_px} x {height_px}{depth}  {uri}")
+        let Self { frames, width_px, height_px, format, depth, codes, .. } = self;
+        let content = match (depth, codes) {
+            (Some(depth), _) => depth.line(),
+            (None, Some([min, max])) => format!(", values {min} to {max}"),
+            (None, None) => String::new(),
+        };
+        format!("{frames} x {format} {width_px} x {height_px} px{content}")
     }
 }
 
@@ -458,17 +503,23 @@ impl DepthSummary {
     }
 }
 
+impl FolderLayout {
+    /// For people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tum => "TUM RGB-D",
+            Self::SevenScenes => "7-Scenes",
+            Self::ColorAndDepth => "colour and depth images",
+            Self::Images => "images",
+        }
+    }
+}
+
 impl std::fmt::Display for Description {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let layout = match self.layout {
-            FolderLayout::Tum => "TUM RGB-D",
-            FolderLayout::SevenScenes => "7-Scenes",
-            FolderLayout::ColorAndDepth => "colour and depth images",
-            FolderLayout::Images => "images",
-        };
-        writeln!(f, "{}: {layout}, {} poses", self.folder.display(), self.poses)?;
+        writeln!(f, "{}: {}, {} poses", self.folder.display(), self.layout.name(), self.poses)?;
         for series in &self.series {
-            writeln!(f, "  {}", series.line())?;
+            writeln!(f, "  {}  {}", series.line(), series.uri)?;
         }
         for problem in &self.problems {
             writeln!(f, "  problem: {problem}")?;

@@ -28,7 +28,9 @@ pub mod tum;
 
 use crate::camera::{Camera, CaptureError};
 pub use camera::ImagesCamera;
-pub use describe::{DepthSummary, DescribeError, Description, FolderLayout, Series, UnitSource, describe};
+pub use describe::{
+    DepthSummary, DescribeError, Description, FolderLayout, Series, UnitSource, describe, describe_file,
+};
 pub(crate) use options::did_you_mean;
 pub use options::{Deliver, ImagesOptions, Layout, Pace, TumStream};
 

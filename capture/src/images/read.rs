@@ -134,8 +134,8 @@ fn png_format(color: ColorType) -> Result<PixelFormat, String> {
 /// Reads the first `limit` bytes of a file; returns how many it has.
 fn read_bytes(path: &Path, limit: u64, bytes: &mut Vec<u8>) -> Result<u64, String> {
     let unreadable = |error: std::io::Error| format!("cannot be read: {error}");
-    let file = std::fs::File::open(path).map_err(unreadable)?;
-    let metadata = file.metadata().map_err(unreadable)?;
+    // Opening a pipe would wait for somebody to write into it, so its kind is looked at first.
+    let metadata = std::fs::metadata(path).map_err(unreadable)?;
     if !metadata.is_file() {
         return Err("is no file".into());
     }
@@ -143,6 +143,7 @@ fn read_bytes(path: &Path, limit: u64, bytes: &mut Vec<u8>) -> Result<u64, Strin
         return Err(format!("{} bytes: an image file may have up to {MAX_FILE_BYTES}", metadata.len()));
     }
     bytes.clear();
+    let file = std::fs::File::open(path).map_err(unreadable)?;
     file.take(limit).read_to_end(bytes).map_err(unreadable)?;
     Ok(metadata.len())
 }

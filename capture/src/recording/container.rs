@@ -137,13 +137,14 @@ pub(crate) struct Source {
 impl Source {
     pub(crate) fn open(path: &Path) -> Result<Self, RecordingError> {
         let read_error = |source| RecordingError::Read { path: path.to_owned(), source };
-        let file = File::open(path).map_err(read_error)?;
-        let metadata = file.metadata().map_err(read_error)?;
-        if !metadata.is_file() {
+        // Opening a pipe would wait for somebody to write into it, so its kind is looked at first.
+        if !std::fs::metadata(path).map_err(read_error)?.is_file() {
             let found = "it is no regular file".to_owned();
             return Err(RecordingError::Format { path: path.to_owned(), found });
         }
-        Ok(Self { path: path.to_owned(), file, len: metadata.len() })
+        let file = File::open(path).map_err(read_error)?;
+        let len = file.metadata().map_err(read_error)?.len();
+        Ok(Self { path: path.to_owned(), file, len })
     }
 
     pub(crate) fn path(&self) -> &Path {

@@ -17,6 +17,7 @@ const MAX_DAMAGE_LISTED: usize = 100;
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Description {
     /// The file.
+    #[serde(serialize_with = "crate::lossy_path")]
     pub path: PathBuf,
     /// `mcap` or `rosbag`.
     pub container: String,

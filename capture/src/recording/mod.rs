@@ -43,4 +43,4 @@ pub use reader::{Reader, RecordedFrame};
 pub use recorder::Recorder;
 pub use stream::RecordedStream;
 pub use transform::RecordedTransform;
-pub use writer::{Compression, RecordingOptions, RecordingWriter, StreamCounts, StreamId};
+pub use writer::{Compression, RecordingOptions, RecordingWriter, StreamCounts, StreamId, check_name};

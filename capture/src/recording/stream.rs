@@ -41,8 +41,7 @@ pub(super) enum Role {
 pub(super) fn find(container: &dyn Container) -> (Vec<RecordedStream>, BTreeMap<u32, Role>) {
     let mut streams: Vec<RecordedStream> = Vec::new();
     let mut roles = BTreeMap::new();
-    for (&id, channel) in container.channels() {
-        let Some(kind) = image_message::kind(channel) else { continue };
+    for (id, channel, kind) in image_channels(container) {
         let own_name = channel.metadata.get(STREAM_KEY);
         let name = own_name.map_or_else(|| channel.topic.trim_start_matches('/').to_owned(), Clone::clone);
         let known = own_name
@@ -63,6 +62,26 @@ pub(super) fn find(container: &dyn Container) -> (Vec<RecordedStream>, BTreeMap<
         }
     }
     (streams, roles)
+}
+
+/// In the order in which their streams were added. A recorder makes the channel of a stream's images with its first
+/// image, so which of two comes first is chance; the channel of its [`FrameInfo`](super::FrameInfo) is made at once.
+fn image_channels(container: &dyn Container) -> Vec<(u32, &Channel, ImageKind)> {
+    let channels = container.channels();
+    let added: BTreeMap<&String, u32> = channels
+        .iter()
+        .filter(|(_, channel)| channel.schema == SCHEMA_NAME)
+        .filter_map(|(&id, channel)| Some((channel.metadata.get(STREAM_KEY)?, id)))
+        .collect();
+    let order = |id: u32, channel: &Channel| {
+        channel.metadata.get(STREAM_KEY).and_then(|name| added.get(name)).map_or(id, |&added| added)
+    };
+    let mut found: Vec<_> = channels
+        .iter()
+        .filter_map(|(&id, channel)| Some((id, channel, image_message::kind(channel)?)))
+        .collect();
+    found.sort_by_key(|&(id, channel, _)| (order(id, channel), id));
+    found
 }
 
 fn describe(container: &dyn Container, channel: &Channel, name: String) -> RecordedStream {

@@ -441,10 +441,16 @@ fn create_file(path: &Path, overwrite: bool) -> Result<File, RecordingError> {
     })
 }
 
-fn check_name(name: &str) -> Result<(), RecordingError> {
+/// Whether a stream may be called so.
+///
+/// # Errors
+/// [`RecordingError::Name`], which says what is allowed.
+pub fn check_name(name: &str) -> Result<(), RecordingError> {
     let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
-    if name.is_empty() || name.len() > 100 || !name.chars().all(allowed) {
-        let problem = "use 1 to 100 letters, digits, '_', '-' and '.'";
+    // A name of dots only is a folder's, and exports put a stream's images into a folder of its name.
+    let only_dots = name.chars().all(|c| c == '.');
+    if only_dots || name.len() > 100 || !name.chars().all(allowed) {
+        let problem = "use 1 to 100 letters, digits, '_', '-' and '.', not dots alone";
         return Err(RecordingError::Name { name: name.to_owned(), problem });
     }
     Ok(())
