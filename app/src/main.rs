@@ -4,6 +4,7 @@ mod command;
 mod interrupt;
 mod sources;
 
+use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -29,7 +30,13 @@ enum Command {
 fn main() -> ExitCode {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn"));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_target(false)
+        .without_time()
+        .init();
     let result = match Cli::parse().command {
         Command::Info(args) => command::info::run(&args),
         Command::Record(args) => command::record::run(&args),
@@ -41,7 +48,7 @@ fn main() -> ExitCode {
     match result {
         Ok(outcome) => outcome,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            command::print::error(&error);
             ExitCode::from(2)
         }
     }

@@ -11,6 +11,7 @@ use super::print;
 ///
 /// Reads EXR, Radiance HDR, PNG and JPEG; FILE.exr#LAYER names a layer. 8- and 16-bit files are decoded from sRGB.
 /// Differences are A − B, radiance 1.0 = white; FLIP is LDR-FLIP at 67 pixels per degree.
+/// Exit code 0 however far they are from each other; 2 if they cannot be compared.
 #[derive(clap::Args)]
 pub struct Args {
     /// The image to judge

@@ -8,3 +8,12 @@ pub mod print;
 pub mod record;
 pub mod reference;
 pub mod replay;
+
+/// A length of time, of an argument in seconds: ten years at most, so that sums with it stay in range.
+fn seconds(text: &str) -> Result<std::time::Duration, String> {
+    const MAX_S: f64 = 10.0 * 365.25 * 86_400.0;
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.0..=MAX_S).contains(&seconds) => Ok(std::time::Duration::from_secs_f64(seconds)),
+        _ => Err("a number of seconds, 0 or more, such as 2.5".to_owned()),
+    }
+}

@@ -7,14 +7,17 @@ use std::thread;
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow, bail};
-use coshade_capture::recording::{Compression, Recorder, RecordingOptions, StreamCounts, StreamId};
+use coshade_capture::recording::{
+    Compression, Recorder, RecordingError, RecordingOptions, StreamCounts, StreamId, check_name,
+};
 use coshade_capture::{Camera, CaptureError, Timestamp, clock};
 use coshade_lens::calibration::Calibration;
 use coshade_scene::session::Session;
+use coshade_scene::session::source::SourceUri;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use super::print;
+use super::{print, seconds};
 use crate::{interrupt, sources};
 
 /// Frames that may wait to be written, of all streams together.
@@ -27,11 +30,11 @@ const DISK: Duration = Duration::from_secs(30);
 /// Record cameras into an MCAP file: the sensors of a session, or sources named one by one.
 ///
 /// Ends when every source has ended, after --duration or --frames, or on Ctrl-C; the file is whole in every case. Live
-/// cameras never wait for the disk: frames that do not fit are counted and reported. Exit code 1 if frames were lost.
+/// cameras never wait for the disk: frames that do not fit are counted and reported. Exit code 1 if frames were lost or
+/// a source failed; 2, and no file, if nothing could be recorded.
 #[derive(clap::Args)]
 pub struct Args {
     /// Session file, whose camera, fisheye and depth sources are recorded
-    #[arg(required_unless_present = "source")]
     session: Option<PathBuf>,
     /// A source, as NAME=URI, such as camera=images:photos/*.png?fps=30 (repeat for more)
     #[arg(long, value_name = "NAME=URI", conflicts_with = "session", value_parser = name_and_value)]
@@ -46,10 +49,10 @@ pub struct Args {
     #[arg(long)]
     overwrite: bool,
     /// End after so many seconds
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = duration, allow_negative_numbers = true)]
     duration: Option<Duration>,
     /// End each stream after so many frames
-    #[arg(long, value_name = "COUNT")]
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(1..))]
     frames: Option<u64>,
     /// none: least work, largest file; lz4; zstd: smallest file, several times the work of lz4
     #[arg(long, value_enum, default_value = "lz4")]
@@ -70,6 +73,7 @@ enum CompressionArg {
 /// A source about to be recorded.
 struct Input {
     name: String,
+    source: String,
     camera: Box<dyn Camera>,
     calibration: Option<Calibration>,
 }
@@ -92,6 +96,7 @@ struct StreamSummary {
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let (inputs, session_text) = match &args.session {
         Some(path) => session_inputs(path)?,
+        None if args.source.is_empty() => bail!("name a session file, or sources with --source NAME=URI"),
         None => (named_inputs(&args.source, &args.calibration)?, None),
     };
     let options = RecordingOptions {
@@ -104,15 +109,73 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         session: session_text,
         ..RecordingOptions::default()
     };
-    let recorder = Recorder::create(&args.output, options, QUEUE_FRAMES)?;
+    check_output(args, &inputs)?;
+    let recorder = Recorder::create(&args.output, options, QUEUE_FRAMES).inspect_err(|error| {
+        if matches!(error, RecordingError::Write { .. }) {
+            remove_file(&args.output);
+        }
+    })?;
     let begun = clock::now();
     let limits = Limits { end: args.duration.map(|duration| begun + duration), frames: args.frames };
-    let damaged = record_all(&recorder, inputs, limits)?;
+    let ended = record_all(&recorder, inputs, limits);
     let duration_s = clock::now().saturating_since(begun).as_secs_f64();
-    let counts = recorder.finish()?;
-    let streams =
-        counts.into_iter().zip(damaged).map(|(counts, damaged)| StreamSummary { counts, damaged }).collect();
-    report(&Summary { output: args.output.clone(), duration_s, streams }, args.json)
+    let is_empty = recorder.written() == 0;
+    let finished = recorder.finish();
+    let failed = match (&ended, &finished) {
+        (Err(_), _) | (_, Err(_)) => true,
+        (Ok(ended), Ok(_)) => !ended.failed.is_empty(),
+    };
+    if failed && is_empty {
+        remove_file(&args.output);
+    }
+    // Why a source or the file failed says more than that the recording has ended.
+    let ended = ended?;
+    let counts = match finished {
+        Err(error) => return Err(ended.failed.into_iter().next().unwrap_or_else(|| error.into())),
+        Ok(_) if failed && is_empty => {
+            return Err(ended.failed.into_iter().next().unwrap_or_else(|| anyhow!("nothing was recorded")));
+        }
+        Ok(counts) => counts,
+    };
+    for error in &ended.failed {
+        tracing::error!("{error:#}");
+    }
+    let streams = counts
+        .into_iter()
+        .zip(ended.damaged)
+        .map(|(counts, damaged)| StreamSummary { counts, damaged })
+        .collect();
+    let whole = report(&Summary { output: args.output.clone(), duration_s, streams }, args.json)?;
+    Ok(if failed { ExitCode::FAILURE } else { whole })
+}
+
+/// What exists is kept unless told otherwise, and what is being read is always kept.
+fn check_output(args: &Args, inputs: &[Input]) -> anyhow::Result<()> {
+    let output = &args.output;
+    if output.is_dir() {
+        bail!("{}: is a folder; name a file in it", output.display());
+    }
+    if output.exists() && !args.overwrite {
+        bail!("{}: exists already; choose another name, or give --overwrite", output.display());
+    }
+    let Ok(output_file) = output.canonicalize() else { return Ok(()) };
+    for input in inputs {
+        let file =
+            input.source.parse::<SourceUri>().ok().and_then(|uri| Path::new(&uri.path).canonicalize().ok());
+        if file.as_ref() == Some(&output_file) {
+            bail!("{}: source {} reads this file; choose another output", output.display(), input.name);
+        }
+    }
+    Ok(())
+}
+
+/// A recording of nothing. Devices such as /dev/null stay.
+fn remove_file(path: &Path) {
+    if path.metadata().is_ok_and(|about| about.is_file())
+        && let Err(error) = std::fs::remove_file(path)
+    {
+        tracing::warn!("{}: holds nothing, and cannot be removed: {error}", path.display());
+    }
 }
 
 fn report(summary: &Summary, json: bool) -> anyhow::Result<ExitCode> {
@@ -136,8 +199,16 @@ struct Limits {
     frames: Option<u64>,
 }
 
-/// One thread a source, until all have ended. Returns the number of damaged frames of each.
-fn record_all(recorder: &Recorder, inputs: Vec<Input>, limits: Limits) -> anyhow::Result<Vec<u64>> {
+/// How the sources ended.
+struct Ended {
+    /// Damaged frames of each source.
+    damaged: Vec<u64>,
+    /// Why sources ended before their time.
+    failed: Vec<anyhow::Error>,
+}
+
+/// One thread a source, until all have ended.
+fn record_all(recorder: &Recorder, inputs: Vec<Input>, limits: Limits) -> anyhow::Result<Ended> {
     let stop = interrupt::on_ctrl_c()?;
     let progress = progress_line();
     let mut streams = Vec::new();
@@ -146,7 +217,7 @@ fn record_all(recorder: &Recorder, inputs: Vec<Input>, limits: Limits) -> anyhow
         let id = recorder.add_stream(&input.name, input.calibration.as_ref(), rate)?;
         streams.push((input, id, AtomicU64::new(0)));
     }
-    let failed: Vec<anyhow::Error> = thread::scope(|scope| {
+    let failed = thread::scope(|scope| {
         let threads: Vec<_> = streams
             .iter_mut()
             .map(|(input, id, damaged)| {
@@ -162,21 +233,11 @@ fn record_all(recorder: &Recorder, inputs: Vec<Input>, limits: Limits) -> anyhow
         threads.into_iter().filter_map(|thread| joined(thread).err()).collect()
     });
     progress.finish_and_clear();
-    for error in &failed {
-        tracing::warn!("{error:#}");
-    }
-    if failed.len() == streams.len()
-        && recorder.written() == 0
-        && let Some(error) = failed.into_iter().next()
-    {
-        return Err(error);
-    }
-    Ok(streams.into_iter().map(|(_, _, damaged)| damaged.into_inner()).collect())
+    let damaged = streams.into_iter().map(|(_, _, damaged)| damaged.into_inner()).collect();
+    Ok(Ended { damaged, failed })
 }
 
-fn joined(
-    thread: std::io::Result<thread::ScopedJoinHandle<'_, anyhow::Result<()>>>,
-) -> anyhow::Result<()> {
+fn joined(thread: std::io::Result<thread::ScopedJoinHandle<'_, anyhow::Result<()>>>) -> anyhow::Result<()> {
     thread.context("no thread for a source")?.join().map_err(|_| anyhow!("a source's thread has failed"))?
 }
 
@@ -236,16 +297,14 @@ fn session_inputs(path: &Path) -> anyhow::Result<(Vec<Input>, Option<String>)> {
     Ok((inputs, Some(session.text().to_owned())))
 }
 
-fn named_inputs(
-    source: &[(String, String)],
-    calibration: &[(String, String)],
-) -> anyhow::Result<Vec<Input>> {
+fn named_inputs(source: &[(String, String)], calibration: &[(String, String)]) -> anyhow::Result<Vec<Input>> {
     for (name, file) in calibration {
         if source.iter().all(|(source, _)| source != name) {
             bail!("--calibration {name}={file}: there is no --source {name}=…");
         }
     }
     for (index, (name, _)) in source.iter().enumerate() {
+        check_name(name)?;
         if source[..index].iter().any(|(other, _)| other == name) {
             bail!("--source {name}=…: two sources of this name");
         }
@@ -265,17 +324,21 @@ fn open(name: &str, source: &str, calibration: Option<&Path>) -> anyhow::Result<
         Some(file) => Some(sources::calibration_for(camera.as_ref(), file)?),
         None => camera.calibration().cloned(),
     };
-    Ok(Input { name: name.to_owned(), camera, calibration })
+    Ok(Input { name: name.to_owned(), source: source.to_owned(), camera, calibration })
 }
 
 fn name_and_value(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
-        Some((name, value)) if !name.is_empty() && !value.is_empty() => Ok((name.to_owned(), value.to_owned())),
-        _ => Err("write NAME=VALUE".to_owned()),
+        Some((name, value)) if !name.is_empty() && !value.is_empty() => {
+            Ok((name.to_owned(), value.to_owned()))
+        }
+        _ => Err("a name, `=`, and what it stands for, such as camera=images:photos".to_owned()),
     }
 }
 
-fn seconds(text: &str) -> Result<Duration, String> {
-    let seconds: f64 = text.parse().map_err(|_| "not a number of seconds")?;
-    Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
+fn duration(text: &str) -> Result<Duration, String> {
+    match seconds(text)? {
+        Duration::ZERO => Err("nothing can be recorded in no time".to_owned()),
+        duration => Ok(duration),
+    }
 }

@@ -1,26 +1,26 @@
 //! `coshade replay`: plays a recording through, as a session would.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use anyhow::{Context, anyhow};
+use anyhow::{Context, anyhow, bail};
 use coshade_capture::recording::Reader;
 use coshade_capture::replay::{Playback, Rate, ReplayCamera, ReplayOptions};
 use coshade_capture::{Camera, CaptureError, Converter, Frame, PixelFormat, Timestamp, clock};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use super::print;
+use super::{print, seconds};
 use crate::interrupt;
 
 const POLL: Duration = Duration::from_millis(100);
 
 /// Play a recording through and report rates, gaps and damage; --export writes its frames as image files.
 ///
-/// Exit code 1 if frames were damaged.
+/// Exit code 1 if frames were damaged, 2 if the recording cannot be played or an image not written.
 #[derive(clap::Args)]
 pub struct Args {
     /// The recording; FILE#STREAM plays one stream, FILE all
@@ -28,8 +28,8 @@ pub struct Args {
     /// 1 = in real time, 2 = twice as fast, max = as fast as can be
     #[arg(long, default_value = "1", value_parser = rate)]
     rate: Rate,
-    /// Begin so many seconds behind the first frame
-    #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
+    /// Begin so many seconds after the first frame
+    #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds, allow_negative_numbers = true)]
     start: Duration,
     /// Play again and again, until Ctrl-C
     #[arg(long = "loop")]
@@ -64,12 +64,17 @@ struct StreamSummary {
 
 /// Plays and prints.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let whole = Path::new(&args.recording);
     let (path, only) = match args.recording.rsplit_once('#') {
-        Some((path, stream)) => (PathBuf::from(path), Some(stream)),
-        None => (PathBuf::from(&args.recording), None),
+        Some((path, stream)) if !whole.exists() => (PathBuf::from(path), Some(stream)),
+        _ => (whole.to_owned(), None),
     };
     let options = ReplayOptions { rate: args.rate, looping: args.looping, start: args.start };
     let playback = Playback::open(&path, options)?;
+    if args.start > playback.duration() {
+        let length_s = playback.duration().as_secs_f64();
+        bail!("--start {}: {} lasts only {length_s:.3} s", args.start.as_secs_f64(), path.display());
+    }
     let names: Vec<String> = match only {
         Some(name) => vec![name.to_owned()],
         None => Reader::open(&path)?.streams().iter().map(|stream| stream.name.clone()).collect(),
@@ -125,7 +130,10 @@ fn play(args: &Args, playback: &Playback, cameras: Vec<(ReplayCamera, String)>) 
         threads
             .into_iter()
             .map(|thread| {
-                thread.context("no thread for a stream")?.join().map_err(|_| anyhow!("a stream's thread has failed"))?
+                thread
+                    .context("no thread for a stream")?
+                    .join()
+                    .map_err(|_| anyhow!("a stream's thread has failed"))?
             })
             .collect::<anyhow::Result<Vec<_>>>()
     });
@@ -221,9 +229,8 @@ struct Export {
 }
 
 impl Export {
-    fn new(folder: &std::path::Path, stream: &str) -> anyhow::Result<Self> {
-        // A stream of another program's recording is named by its topic: keep slashes out of the path.
-        let folder = folder.join(stream.replace('/', "_"));
+    fn new(folder: &Path, stream: &str) -> anyhow::Result<Self> {
+        let folder = folder.join(folder_name(stream));
         std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
         Ok(Self { folder, converter: Converter::default(), written: 0 })
     }
@@ -232,26 +239,43 @@ impl Export {
         let ending = if frame.format == PixelFormat::Mjpg { "jpg" } else { "png" };
         let path = self.folder.join(format!("{:06}.{ending}", self.written));
         self.written += 1;
+        let written = self.write_file(&path, frame).with_context(|| path.display().to_string());
+        if written.is_err() {
+            // Half an image is worse than none; the error above is the one to report.
+            let _ = std::fs::remove_file(&path);
+        }
+        written
+    }
+
+    fn write_file(&mut self, path: &Path, frame: &Frame) -> anyhow::Result<()> {
         let (width, height) = (frame.width_px, frame.height_px);
         match frame.format {
-            PixelFormat::Mjpg => std::fs::write(&path, &frame.pixels[..]).with_context(|| path.display().to_string()),
+            PixelFormat::Mjpg => Ok(std::fs::write(path, &frame.pixels[..])?),
             PixelFormat::Grey => {
                 let rows: Vec<u8> = (0..height).filter_map(|y| frame.row(y)).flatten().copied().collect();
-                Ok(image::save_buffer(&path, &rows, width, height, image::ColorType::L8)?)
+                Ok(image::save_buffer(path, &rows, width, height, image::ColorType::L8)?)
             }
             PixelFormat::Y16 | PixelFormat::Z16 => {
                 let bytes: Vec<u8> = (0..height).filter_map(|y| frame.row(y)).flatten().copied().collect();
-                let codes = bytes.chunks_exact(2).map(|code| u16::from_le_bytes([code[0], code[1]])).collect();
+                let codes =
+                    bytes.chunks_exact(2).map(|code| u16::from_le_bytes([code[0], code[1]])).collect();
                 let image = image::ImageBuffer::<image::Luma<u16>, Vec<u16>>::from_raw(width, height, codes);
-                Ok(image.context("a frame shorter than its size")?.save(&path)?)
+                Ok(image.context("a frame shorter than its size")?.save(path)?)
             }
             _ => {
                 let mut rgb = vec![0; 3 * frame.pixel_count()];
                 self.converter.rgb24(frame, &mut rgb)?;
-                Ok(image::save_buffer(&path, &rgb, width, height, image::ColorType::Rgb8)?)
+                Ok(image::save_buffer(path, &rgb, width, height, image::ColorType::Rgb8)?)
             }
         }
     }
+}
+
+/// The folder for a stream, always one within the export: a stream of another program's recording is named by its
+/// topic, which may hold slashes, or be `..`.
+fn folder_name(stream: &str) -> String {
+    let name = stream.replace(['/', '\\'], "_");
+    if name.chars().all(|c| c == '.') { name.replace('.', "_") + "_" } else { name }
 }
 
 fn rate(text: &str) -> Result<Rate, String> {
@@ -264,7 +288,18 @@ fn rate(text: &str) -> Result<Rate, String> {
     }
 }
 
-fn seconds(text: &str) -> Result<Duration, String> {
-    let seconds: f64 = text.parse().map_err(|_| "not a number of seconds")?;
-    Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
+#[cfg(test)]
+mod tests {
+    use super::folder_name;
+
+    #[test]
+    fn an_export_stays_in_its_folder() {
+        assert_eq!(folder_name("camera"), "camera");
+        assert_eq!(folder_name("device_0/image/data"), "device_0_image_data");
+        for stream in ["", ".", "..", "../..", "/", "/etc", "..\\.."] {
+            let name = folder_name(stream);
+            let parts: Vec<_> = std::path::Path::new(&name).components().collect();
+            assert!(matches!(parts[..], [std::path::Component::Normal(_)]), "{stream:?} became {name:?}");
+        }
+    }
 }

@@ -30,7 +30,8 @@ fn text(calibration: &Calibration) -> String {
     if let Some(rms_px) = provenance.rms_px {
         let _ = writeln!(out, "  reprojection error {rms_px} px RMS over {} images", provenance.images.len());
     }
-    for (label, value) in [("made", &provenance.when), ("by", &provenance.tool), ("notes", &provenance.notes)] {
+    for (label, value) in [("made", &provenance.when), ("by", &provenance.tool), ("notes", &provenance.notes)]
+    {
         if let Some(value) = value {
             let _ = writeln!(out, "  {label}: {value}");
         }
@@ -63,7 +64,8 @@ fn problems(calibration: &Calibration) -> Vec<Problem> {
     let params = calibration.model.params();
     if let [fx, fy, cx, cy, ..] = params[..] {
         if (fx / fy - 1.0).abs() > 0.02 {
-            let message = format!("fx and fy differ by {:.1}%: rare on real sensors", (fx / fy - 1.0).abs() * 100.0);
+            let message =
+                format!("fx and fy differ by {:.1}%: rare on real sensors", (fx / fy - 1.0).abs() * 100.0);
             problems.push(Problem::new(Severity::Warning, message));
         }
         let off = ((cx - (width - 1.0) / 2.0) / width).hypot((cy - (height - 1.0) / 2.0) / height);

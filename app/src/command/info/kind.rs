@@ -61,18 +61,40 @@ pub fn of(path: &Path) -> anyhow::Result<Kind> {
     if let Some(kind) = by_first_bytes(&head) {
         return Ok(kind);
     }
+    match by_ending(path) {
+        Some(Kind::Session) => by_keys(path),
+        Some(kind) => Ok(kind),
+        None => bail!(
+            "{}: not a kind of file that coshade knows (recordings .mcap .bag, settings .toml, meshes .glb .gltf .obj \
+             .ply, images .exr .hdr .png .jpg .jpeg .pgm .ppm){}",
+            path.display(),
+            advice(path)
+        ),
+    }
+}
+
+/// What the name says; [`Kind::Session`] for any TOML file.
+pub fn by_ending(path: &Path) -> Option<Kind> {
+    let ending = path.extension()?.to_string_lossy().to_ascii_lowercase();
+    match ending.as_str() {
+        "mcap" | "bag" => Some(Kind::Recording),
+        "glb" | "gltf" | "obj" | "ply" => Some(Kind::Mesh),
+        "exr" | "hdr" | "png" | "jpg" | "jpeg" => Some(Kind::Image),
+        "pgm" | "ppm" | "pnm" => Some(Kind::DepthImage),
+        "toml" => Some(Kind::Session),
+        _ => None,
+    }
+}
+
+/// What to do with files in which other programs keep calibrations and poses.
+fn advice(path: &Path) -> &'static str {
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     match ending.as_str() {
-        "mcap" | "bag" => Ok(Kind::Recording),
-        "glb" | "gltf" | "obj" | "ply" => Ok(Kind::Mesh),
-        "exr" | "hdr" | "png" | "jpg" | "jpeg" => Ok(Kind::Image),
-        "pgm" | "ppm" | "pnm" => Ok(Kind::DepthImage),
-        "toml" => by_keys(path),
-        _ => bail!(
-            "{}: not a kind of file that coshade knows (recordings .mcap .bag, settings .toml, meshes .glb .gltf .obj \
-             .ply, images .exr .hdr .png .jpg .pgm)",
-            path.display()
-        ),
+        "yaml" | "yml" | "json" | "xml" => {
+            "; a calibration of OpenCV or Kalibr goes into a .toml, number by number, in the same order"
+        }
+        "txt" => "; a list of an RGB-D data set is read with the folder that holds it",
+        _ => "",
     }
 }
 

@@ -32,7 +32,7 @@ pub fn look(path: &Path) -> anyhow::Result<Found> {
     );
     let _ = writeln!(
         text,
-        "  {}, {} separate pieces, {} open edges, {} edges of more than two triangles",
+        "  {}, {} pieces (joined by edges), {} open edges, {} edges of more than two triangles",
         if topology.is_closed() { "closed" } else { "not closed" },
         topology.components.len(),
         topology.open_edges.len(),

@@ -21,13 +21,14 @@ use kind::Kind;
 /// Say what is in a file or folder, and what is wrong with it.
 ///
 /// Knows recordings (MCAP, ROS 1 bags), calibration, rig and session files, meshes (glTF, OBJ, PLY), images (EXR, HDR,
-/// PNG, JPEG) and folders of images (also TUM RGB-D, 7-Scenes). Exit code 1 if something is wrong with the file.
+/// PNG, JPEG, PGM) and folders of images (also TUM RGB-D, 7-Scenes). Exit code 1 if something is wrong with the file, 2
+/// if it cannot be read.
 #[derive(clap::Args)]
 pub struct Args {
     /// The file or folder
     path: PathBuf,
-    /// Metres a count of the depth images in a folder, where nothing else says
-    #[arg(long, value_name = "METRES")]
+    /// Take 16 bit grey images for depth, with so many metres a count: 0.001 for millimetres, 0.0002 for TUM
+    #[arg(long, value_name = "METRES", value_parser = depth_unit, allow_negative_numbers = true)]
     depth_unit_m: Option<f64>,
     /// Print one JSON object: `path`, `kind`, `problems` (each with `severity` and `message`), and under `content`
     /// what is in the file; units are in the names
@@ -38,7 +39,7 @@ pub struct Args {
 /// What was found.
 #[derive(Serialize)]
 struct Info {
-    path: PathBuf,
+    path: String,
     kind: Kind,
     content: serde_json::Value,
     problems: Vec<Problem>,
@@ -85,20 +86,27 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(if wrong { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
+fn depth_unit(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(unit_m) if unit_m > 0.0 && unit_m <= 1.0 => Ok(unit_m),
+        _ => Err("metres a count, above 0 and at most 1, such as 0.001".to_owned()),
+    }
+}
+
 fn look(path: &Path, depth_unit_m: Option<f64>) -> anyhow::Result<Info> {
     let kind = kind::of(path)?;
     let found = match kind {
         Kind::Folder => folder::look(path, depth_unit_m),
         Kind::Recording => recording::look(path),
         Kind::Mesh => mesh::look(path),
-        Kind::Image => picture::look(path),
+        Kind::Image => picture::look(path, depth_unit_m),
         Kind::DepthImage => folder::look_at_file(path, depth_unit_m),
         Kind::Calibration => calibration::look(path),
         Kind::Session => session::look(path),
         Kind::Rig => rig::look(path),
     }?;
     Ok(Info {
-        path: path.to_owned(),
+        path: path.display().to_string(),
         kind,
         content: found.content,
         problems: found.problems,
@@ -107,7 +115,7 @@ fn look(path: &Path, depth_unit_m: Option<f64>) -> anyhow::Result<Info> {
 }
 
 fn readable(info: &Info) -> String {
-    let mut out = format!("{}: {}\n{}", info.path.display(), info.kind.name(), info.text);
+    let mut out = format!("{}: {}\n{}", info.path, info.kind.name(), info.text);
     for problem in &info.problems {
         let label = match problem.severity {
             Severity::Note => "note",

@@ -4,13 +4,21 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use coshade_reference::image_file::{self, Channel, Layer};
+use image::{ColorType, ImageDecoder as _, ImageFormat};
 use serde_json::json;
 
-use super::{Found, Problem, Severity};
+use super::{Found, Problem, Severity, folder};
 
-pub fn look(path: &Path) -> anyhow::Result<Found> {
+pub fn look(path: &Path, depth_unit_m: Option<f64>) -> anyhow::Result<Found> {
+    let coding = Coding::of(path);
+    if coding == Coding::Grey16 {
+        return folder::look_at_file(path, depth_unit_m);
+    }
     let image = image_file::read(path)?;
-    let mut text = String::from("  values are linear, 1 = white; 8 and 16 bit files are decoded from sRGB\n");
+    let mut text = match coding {
+        Coding::Linear => String::from("  values are linear, 1 = white\n"),
+        _ => String::from("  values are linear, 1 = white, decoded from sRGB\n"),
+    };
     let mut layers = Vec::new();
     for layer in &image.layers {
         let (line, content) = layer_figures(layer);
@@ -19,6 +27,33 @@ pub fn look(path: &Path) -> anyhow::Result<Found> {
     }
     let problems = image.notes.iter().map(|note| Problem::new(Severity::Warning, note.clone())).collect();
     Ok(Found { content: json!({ "layers": layers }), text, problems })
+}
+
+/// How the file holds its values.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Coding {
+    /// EXR, Radiance HDR.
+    Linear,
+    /// PNG and JPEG of colour, or 8 bit.
+    Srgb,
+    /// Depth, or a machine's camera.
+    Grey16,
+}
+
+impl Coding {
+    /// A file that cannot be decoded counts as linear: reading it says what is wrong.
+    fn of(path: &Path) -> Self {
+        let decoder = image::ImageReader::open(path)
+            .and_then(image::ImageReader::with_guessed_format)
+            .ok()
+            .filter(|reader| matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg)))
+            .and_then(|reader| reader.into_decoder().ok());
+        match decoder.map(|decoder| decoder.color_type()) {
+            None => Self::Linear,
+            Some(ColorType::L16) => Self::Grey16,
+            Some(_) => Self::Srgb,
+        }
+    }
 }
 
 fn layer_figures(layer: &Layer) -> (String, serde_json::Value) {
@@ -35,6 +70,9 @@ fn layer_figures(layer: &Layer) -> (String, serde_json::Value) {
     let census = image.census();
     if census.nan + census.infinite > 0 {
         let _ = writeln!(line, "    {} samples are not a number, {} infinite", census.nan, census.infinite);
+    }
+    if census.negative > 0 {
+        let _ = writeln!(line, "    {} samples are below 0", census.negative);
     }
     let content = json!({
         "name": layer.name,

@@ -48,7 +48,8 @@ fn stream_line(stream: &StreamDescription) -> String {
         let _ = write!(line, ", {rate:.2} frames/s, longest gap {:.1} ms", stream.longest_interval_s * 1e3);
     }
     if let Some(unit_m) = stream.depth_unit_m {
-        let _ = write!(line, ", depth unit {unit_m} m");
+        // Cameras state it in 32 bit: seven digits are all it has.
+        let _ = write!(line, ", depth unit {} m", (unit_m * 1e9).round() / 1e9);
     }
     if stream.exposure {
         line += ", exposure times";
@@ -66,7 +67,11 @@ fn stream_line(stream: &StreamDescription) -> String {
 fn problems(description: &Description) -> Vec<Problem> {
     let mut problems = Vec::new();
     for damage in &description.damage {
-        let message = format!("at byte {}: {} ({} bytes lost)", damage.offset, damage.what, damage.lost_bytes);
+        let lost = match damage.lost_bytes {
+            0 => String::new(),
+            bytes => format!(" ({bytes} bytes lost)"),
+        };
+        let message = format!("at byte {}: {}{lost}", damage.offset, damage.what);
         problems.push(Problem::new(Severity::Error, message));
     }
     let unlisted = description.damage_count.saturating_sub(description.damage.len() as u64);
@@ -74,7 +79,8 @@ fn problems(description: &Description) -> Vec<Problem> {
         problems.push(Problem::new(Severity::Error, format!("and {unlisted} more damaged places")));
     }
     if !description.indexed {
-        let message = "no index: the recording was cut short, or never finished; it plays up to its last whole chunk";
+        let message =
+            "no index: the recording was cut short, or never finished; it plays up to its last whole chunk";
         problems.push(Problem::new(Severity::Warning, message));
     }
     for stream in &description.streams {

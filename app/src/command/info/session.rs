@@ -40,7 +40,9 @@ fn unopenable(session: &Session) -> anyhow::Result<Vec<Problem>> {
     let registry = sources::registry();
     let known: Vec<_> = registry.schemes().map(|(name, _)| name).collect();
     let sensors = sources::sensors(session)?;
-    let unknown = sensors.iter().filter(|sensor| !known.iter().any(|name| sensor.source.starts_with(&format!("{name}:"))));
+    let unknown = sensors
+        .iter()
+        .filter(|sensor| !known.iter().any(|name| sensor.source.starts_with(&format!("{name}:"))));
     Ok(unknown
         .map(|sensor| {
             let message = format!("[{}]: this program opens only {} sources", sensor.name, known.join(", "));
