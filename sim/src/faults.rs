@@ -157,7 +157,9 @@ impl Faults {
     /// When the stall ends that a time falls into.
     pub fn stall_end_s(&self, time_s: f64) -> Option<f64> {
         let ends = self.specs.iter().filter_map(|spec| match spec {
-            FaultSpec::Stall { from_s, for_s } if (*from_s..from_s + for_s).contains(&time_s) => Some(from_s + for_s),
+            FaultSpec::Stall { from_s, for_s } if (*from_s..from_s + for_s).contains(&time_s) => {
+                Some(from_s + for_s)
+            }
             _ => None,
         });
         ends.reduce(f64::max)

@@ -86,7 +86,8 @@ impl Random {
 
 /// A number for a name, such as that of a sensor (FNV-1a, 64 bit).
 pub fn name_seed(name: &str) -> u64 {
-    name.bytes().fold(0xCBF2_9CE4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3))
+    name.bytes()
+        .fold(0xCBF2_9CE4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3))
 }
 
 #[cfg(test)]
@@ -116,7 +117,9 @@ mod tests {
         check((0..200_000).map(|pixel| at(pixel).normal()), 0.0, 1.0, 3.0);
         check((0..200_000).map(|pixel| at(pixel).uniform()), 0.5, 1.0 / 12.0, 1.8);
         // The product of independent numbers of mean 0 has mean 0 and variance 1 (and kurtosis 9).
-        let product = |other: fn(u64) -> Random| (0..200_000).map(move |pixel| at(pixel).normal() * other(pixel).normal());
+        let product = |other: fn(u64) -> Random| {
+            (0..200_000).map(move |pixel| at(pixel).normal() * other(pixel).normal())
+        };
         check(product(|pixel| Random::at(1, 2, Purpose::ImageNoise, 3, pixel + 1)), 0.0, 1.0, 9.0);
         check(product(|pixel| Random::at(1, 2, Purpose::ImageNoise, 4, pixel)), 0.0, 1.0, 9.0);
         check(product(|pixel| Random::at(2, 2, Purpose::ImageNoise, 3, pixel)), 0.0, 1.0, 9.0);
@@ -130,7 +133,9 @@ mod tests {
             check((0..100_000).map(|pixel| at(pixel).poisson(mean)), mean, mean, 3.0 + 1.0 / mean);
         }
         // The share of zeros is e^−mean.
-        let zeros = (0..100_000).filter(|&pixel| Random::at(5, 0, Purpose::Fault, 0, pixel).poisson(2.0) == 0.0).count();
+        let zeros = (0..100_000)
+            .filter(|&pixel| Random::at(5, 0, Purpose::Fault, 0, pixel).poisson(2.0) == 0.0)
+            .count();
         let share = (-2.0_f64).exp();
         let error = (share * (1.0 - share) / 1e5).sqrt();
         assert!((zeros as f64 / 1e5 - share).abs() < 5.0 * error);

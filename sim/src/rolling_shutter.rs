@@ -28,7 +28,9 @@ impl RollingShutter {
         let count = self.bands.clamp(1, self.height_px);
         let border = |k: u32| (u64::from(k) * u64::from(self.height_px) / u64::from(count)) as u32;
         let bands = (0..count).map(|k| border(k)..border(k + 1));
-        bands.map(|rows| (rows.clone(), self.row_time_s(f64::from(rows.start + rows.end - 1) / 2.0))).collect()
+        bands
+            .map(|rows| (rows.clone(), self.row_time_s(f64::from(rows.start + rows.end - 1) / 2.0)))
+            .collect()
     }
 }
 

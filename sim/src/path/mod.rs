@@ -39,7 +39,9 @@ pub enum PathError {
     #[error("no keyframes: at least one is needed")]
     Empty,
     /// Times do not rise.
-    #[error("keyframe {index}: time {time_s} s does not come after that of the keyframe before, by at least {MIN_STEP_S} s")]
+    #[error(
+        "keyframe {index}: time {time_s} s does not come after that of the keyframe before, by at least {MIN_STEP_S} s"
+    )]
     Order {
         /// Which, from 0.
         index: usize,
@@ -47,7 +49,9 @@ pub enum PathError {
         time_s: f64,
     },
     /// A turn of more than half a circle has two ways.
-    #[error("keyframe {index}: turned by {angle_deg:.0}° against the one before; at most {MAX_TURN_DEG}° are allowed, put one between")]
+    #[error(
+        "keyframe {index}: turned by {angle_deg:.0}° against the one before; at most {MAX_TURN_DEG}° are allowed, put one between"
+    )]
     Turn {
         /// Which, from 0.
         index: usize,
@@ -55,7 +59,9 @@ pub enum PathError {
         angle_deg: f64,
     },
     /// No curve was found.
-    #[error("no smooth curve passes through the keyframes: their times are too uneven or they turn too fast; put more between")]
+    #[error(
+        "no smooth curve passes through the keyframes: their times are too uneven or they turn too fast; put more between"
+    )]
     NoCurve,
 }
 
@@ -110,7 +116,11 @@ impl Path {
     /// Where the rig is at a time, and how fast.
     pub fn motion(&self, time_s: f64) -> Motion {
         let (Some(&first_s), Some(&last_s)) = (self.times_s.first(), self.times_s.last()) else {
-            return Motion { pose: Rigid::IDENTITY, velocity_m_per_s: DVec3::ZERO, angular_velocity_rad_per_s: DVec3::ZERO };
+            return Motion {
+                pose: Rigid::IDENTITY,
+                velocity_m_per_s: DVec3::ZERO,
+                angular_velocity_rad_per_s: DVec3::ZERO,
+            };
         };
         // `clamp` keeps NaN, which finds no segment; a time that is no number is the start.
         let inside_s = if time_s.is_nan() { first_s } else { time_s.clamp(first_s, last_s) };

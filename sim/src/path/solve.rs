@@ -66,7 +66,14 @@ pub(super) fn positions(times_s: &[f64], places_m: &[DVec3]) -> Option<Vec<DVec3
     };
     let largest_m = places_m.iter().map(|place| place.length()).fold(1.0, f64::max);
     let mirrored = |end: DVec3, next: DVec3| 2.0 * end - next;
-    solved(times_s, places_m, mirrored, missed, |control, error| control + error, POSITION_TOLERANCE_M * largest_m)
+    solved(
+        times_s,
+        places_m,
+        mirrored,
+        missed,
+        |control, error| control + error,
+        POSITION_TOLERANCE_M * largest_m,
+    )
 }
 
 pub(super) fn rotations(times_s: &[f64], turns: &[DQuat]) -> Option<Vec<DQuat>> {

@@ -106,7 +106,8 @@ impl DepthSensor {
     /// and truth, whatever the number of threads.
     pub fn counts(&self, truth: &[DepthSample], frame: u64) -> Vec<u16> {
         let width = self.size_px[0] as usize;
-        let holes: Vec<bool> = (0..truth.len()).into_par_iter().map(|pixel| self.is_shadowed(truth, pixel)).collect();
+        let holes: Vec<bool> =
+            (0..truth.len()).into_par_iter().map(|pixel| self.is_shadowed(truth, pixel)).collect();
         (0..truth.len())
             .into_par_iter()
             .map(|pixel| {
@@ -114,7 +115,9 @@ impl DepthSensor {
                 let [dx, dy] = random.normal_pair().map(|n| (n * self.spec.lateral_sigma_px).round() as i64);
                 let place = self.moved(pixel % width, pixel / width, dx, dy);
                 match truth.get(place) {
-                    Some(sample) if !holes.get(place).copied().unwrap_or(true) => self.count(sample, &mut random),
+                    Some(sample) if !holes.get(place).copied().unwrap_or(true) => {
+                        self.count(sample, &mut random)
+                    }
                     _ => 0,
                 }
             })
@@ -146,11 +149,15 @@ impl DepthSensor {
     /// True on the farther side of a depth edge: the projector or the camera does not see it.
     fn is_shadowed(&self, truth: &[DepthSample], pixel: usize) -> bool {
         let (width, reach) = (self.size_px[0] as usize, i64::from(self.spec.edge_hole_px));
-        let Some(own) = truth.get(pixel).filter(|sample| is_measurable(f64::from(sample.z_m))) else { return true };
+        let Some(own) = truth.get(pixel).filter(|sample| is_measurable(f64::from(sample.z_m))) else {
+            return true;
+        };
         let edge_m = f64::from(own.z_m) * (1.0 - self.spec.edge_ratio);
         let mut around = (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy)));
         around.any(|(dx, dy)| {
-            let near = truth.get(self.moved(pixel % width, pixel / width, dx, dy)).map_or(0.0, |near| f64::from(near.z_m));
+            let near = truth
+                .get(self.moved(pixel % width, pixel / width, dx, dy))
+                .map_or(0.0, |near| f64::from(near.z_m));
             is_measurable(near) && near < edge_m
         })
     }

@@ -110,7 +110,12 @@ fn jpeg(codes: &[u8], [width, height]: [u32; 2]) -> Result<Vec<u8>, EncodeError>
 }
 
 /// 4:2:2: each luma with one of the two chroma of its pair of pixels.
-fn packed(luma: impl Iterator<Item = u8>, rgb: &[[u8; 3]], columns: usize, order: fn(u8, u8) -> [u8; 2]) -> Vec<u8> {
+fn packed(
+    luma: impl Iterator<Item = u8>,
+    rgb: &[[u8; 3]],
+    columns: usize,
+    order: fn(u8, u8) -> [u8; 2],
+) -> Vec<u8> {
     let chroma = rgb.chunks(columns.max(1)).flat_map(|row| row_chroma(row).flatten());
     luma.zip(chroma).flat_map(|(y, chroma)| order(y, code(chroma))).collect()
 }
@@ -185,7 +190,8 @@ mod tests {
     #[test]
     fn jpeg_keeps_chroma_at_full_resolution() {
         // Columns of red and blue in turn: halved chroma would make them all alike.
-        let codes: Vec<u8> = (0..16 * 16).flat_map(|i| if i % 2 == 0 { [200, 40, 40] } else { [40, 40, 200] }).collect();
+        let codes: Vec<u8> =
+            (0..16 * 16).flat_map(|i| if i % 2 == 0 { [200, 40, 40] } else { [40, 40, 200] }).collect();
         let frame = encode(&codes, [16, 16], PixelFormat::Mjpg).unwrap();
         let mut decoded = vec![0; codes.len()];
         Converter::new().rgb24(&frame, &mut decoded).unwrap();

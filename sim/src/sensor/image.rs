@@ -54,7 +54,9 @@ impl ImageSensor {
     /// in the camera's own colours, exposed and vignetted. Without noise, not clipped: the *clean* image.
     pub fn light(&self, radiance: &[[f32; 3]], exposure: &Exposure) -> Vec<[f32; 3]> {
         let pixels = radiance.par_iter().zip(&self.falloff);
-        pixels.map(|(radiance, falloff)| self.pixel_light(radiance, *falloff, exposure).map(|x| x as f32)).collect()
+        pixels
+            .map(|(radiance, falloff)| self.pixel_light(radiance, *falloff, exposure).map(|x| x as f32))
+            .collect()
     }
 
     fn pixel_light(&self, radiance: &[f32; 3], falloff: f32, exposure: &Exposure) -> [f64; 3] {
@@ -70,7 +72,10 @@ impl ImageSensor {
     pub fn codes(&self, radiance: &[[f32; 3]], exposure: &Exposure, frame: u64) -> Vec<u8> {
         let width = self.calibration.size_px[0] as usize;
         let mut codes = vec![0; radiance.len() * 3];
-        let rows = codes.par_chunks_mut(width * 3).zip(radiance.par_chunks(width)).zip(self.falloff.par_chunks(width));
+        let rows = codes
+            .par_chunks_mut(width * 3)
+            .zip(radiance.par_chunks(width))
+            .zip(self.falloff.par_chunks(width));
         rows.enumerate().for_each(|(row, ((codes, radiance), falloff))| {
             let pixels = codes.as_chunks_mut::<3>().0.iter_mut().zip(radiance).zip(falloff);
             for (column, ((codes, radiance), falloff)) in pixels.enumerate() {
