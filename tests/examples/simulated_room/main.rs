@@ -65,7 +65,8 @@ fn main() -> Result<()> {
 /// Position of the rig in the world and the rotation into its frame (x right, y down, z ahead).
 fn hand_held_path(time_s: f64) -> (Vector3<f64>, Rotation3<f64>) {
     let sway = |period_s: f64, phase: f64| (std::f64::consts::TAU * time_s / period_s + phase).sin();
-    let position = Vector3::new(1.1 + 0.10 * sway(2.3, 0.0), 1.2 + 0.25 * sway(3.1, 0.5), 1.45 + 0.03 * sway(0.9, 1.0));
+    let position =
+        Vector3::new(1.1 + 0.10 * sway(2.3, 0.0), 1.2 + 0.25 * sway(3.1, 0.5), 1.45 + 0.03 * sway(0.9, 1.0));
     let (yaw, pitch) = (0.55 + 0.15 * sway(2.9, 0.2), -0.16 + 0.04 * sway(1.7, 0.9));
     let ahead = Vector3::new(yaw.cos() * pitch.cos(), yaw.sin() * pitch.cos(), pitch.sin());
     // `look_at_rh` looks along −z with +y up: half a turn about x makes it z ahead, y down.
@@ -105,7 +106,8 @@ fn encode(picture: &Picture) -> RgbImage {
         let at = 3 * (y * width + x) as usize;
         let code = |linear: f32| {
             let linear = linear.clamp(0.0, 1.0);
-            let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
+            let encoded =
+                if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
             (encoded * 255.0).round() as u8
         };
         Rgb([code(picture.rgb[at]), code(picture.rgb[at + 1]), code(picture.rgb[at + 2])])
