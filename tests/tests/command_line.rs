@@ -12,8 +12,10 @@ fn what_is_recorded_is_replayed_and_exported_bit_by_bit() {
     gradient_frames(&folder.path().join("fisheye"), 10, [32, 32]);
     let run = |args: &str| coshade(folder.path(), args);
 
-    let recorded = run("record --source camera=images:camera/*.png?fps=100 --source fisheye=images:fisheye/*.png?fps=50 \
-                        -o r.mcap --json")
+    let recorded = run(
+        "record --source camera=images:camera/*.png?fps=100 --source fisheye=images:fisheye/*.png?fps=50 \
+                        -o r.mcap --json",
+    )
     .success();
     let recorded = recorded.json();
     assert_eq!(recorded["streams"][0]["written"], 20);
@@ -31,7 +33,8 @@ fn what_is_recorded_is_replayed_and_exported_bit_by_bit() {
     for index in [0, 7, 19] {
         let name = format!("camera/{index:04}.png");
         let original = image::open(folder.path().join(name)).unwrap().into_rgb8();
-        let exported = image::open(folder.path().join(format!("out/camera/{index:06}.png"))).unwrap().into_rgb8();
+        let exported =
+            image::open(folder.path().join(format!("out/camera/{index:06}.png"))).unwrap().into_rgb8();
         assert!(original == exported, "frame {index} came back changed");
     }
     let same = run("compare out/camera/000003.png camera/0003.png --json").success().json();
@@ -43,7 +46,8 @@ fn a_session_is_recorded_with_its_calibrations() {
     let folder = tempfile::tempdir().unwrap();
     gradient_frames(&folder.path().join("camera"), 5, [64, 36]);
     std::fs::copy(workspace("lens/tests/data/camera.toml"), folder.path().join("camera.toml")).unwrap();
-    let session = "version = 1\n[camera]\nsource = \"images:camera/*.png?fps=100\"\ncalibration = \"camera.toml\"\n";
+    let session =
+        "version = 1\n[camera]\nsource = \"images:camera/*.png?fps=100\"\ncalibration = \"camera.toml\"\n";
     std::fs::write(folder.path().join("session.toml"), session).unwrap();
 
     let recorded = coshade(folder.path(), "record session.toml -o r.mcap").success();
@@ -62,7 +66,10 @@ fn an_existing_recording_is_not_overwritten_unless_told() {
     let before = std::fs::read(folder.path().join("r.mcap")).unwrap();
     let refused = coshade(folder.path(), record).failure(2);
     assert!(refused.stderr.contains("r.mcap"), "{}", refused.stderr);
-    assert!(before == std::fs::read(folder.path().join("r.mcap")).unwrap(), "the refused run changed the file");
+    assert!(
+        before == std::fs::read(folder.path().join("r.mcap")).unwrap(),
+        "the refused run changed the file"
+    );
     coshade(folder.path(), &format!("{record} --overwrite")).success();
 }
 
@@ -86,7 +93,9 @@ fn mistakes_are_answered_with_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
     gradient_frames(&folder.path().join("camera"), 1, [16, 16]);
     std::fs::write(folder.path().join("notes.txt"), "hello").unwrap();
-    std::fs::write(folder.path().join("bad.toml"), "version = 1\n[camera]\nsorce = \"v4l:/dev/video0\"\n").unwrap();
+    std::fs::write(folder.path().join("notes.yaml"), "hello").unwrap();
+    std::fs::write(folder.path().join("bad.toml"), "version = 1\n[camera]\nsorce = \"v4l:/dev/video0\"\n")
+        .unwrap();
     let cases = [
         ("info nothing", "nothing"),
         ("info notes.txt", ".mcap"),
@@ -98,12 +107,26 @@ fn mistakes_are_answered_with_what_to_do() {
         ("replay nothing.mcap", "nothing.mcap"),
         ("compare camera/0000.png nothing.png", "nothing.png"),
         ("replay x.mcap --rate fast", "max"),
+        ("record -o x.mcap", "--source NAME=URI"),
+        ("record --source a=images:camera --frames 0 -o x.mcap", "--frames"),
+        ("record --source a=images:camera --duration 0 -o x.mcap", "no time"),
+        ("record --source a=images:camera --duration nan -o x.mcap", "number of seconds"),
+        ("record --source a=images:camera --duration -1 -o x.mcap", "number of seconds"),
+        ("record --source a/b=images:camera -o x.mcap", "a/b"),
+        ("record --source ..=images:camera -o x.mcap", "dots alone"),
+        ("record --source a=images:camera -o camera", "is a folder"),
+        ("record --source a=images:camera -o none/x.mcap", "folder exists"),
+        ("info camera --depth-unit-m nan", "0.001"),
+        ("info notes.yaml", "OpenCV"),
     ];
     for (args, expected) in cases {
         let Run { stderr, .. } = coshade(folder.path(), args).failure(2);
         assert!(stderr.contains(expected), "coshade {args}: {stderr}");
         assert!(!folder.path().join("x.mcap").exists(), "coshade {args} left a file behind");
     }
+    let missing = coshade(folder.path(), "replay nothing.mcap").failure(2).stderr;
+    assert_eq!(missing.lines().count(), 1, "one line, without colours where nobody sees them: {missing}");
+    assert_eq!(missing.matches("os error").count(), 1, "a cause is said once: {missing}");
     let listed = coshade(folder.path(), "info bad.toml").failure(1);
     assert!(listed.stdout.contains("bad.toml:3:1"), "{}", listed.stdout);
 }
@@ -116,4 +139,129 @@ fn doctor_says_a_cure_for_every_problem() {
     for check in checks.iter().filter(|check| check["status"] != "ok") {
         assert!(check["cure"].as_str().is_some_and(|cure| !cure.is_empty()), "{check}");
     }
+}
+
+#[test]
+fn a_recording_is_not_overwritten_by_what_reads_it() {
+    let folder = tempfile::tempdir().unwrap();
+    gradient_frames(&folder.path().join("camera"), 3, [16, 16]);
+    coshade(folder.path(), "record --source camera=images:camera/*.png?fps=200 -o r.mcap").success();
+    let before = std::fs::read(folder.path().join("r.mcap")).unwrap();
+    for args in [
+        "record --source a=replay:./r.mcap#camera?rate=max -o r.mcap --overwrite",
+        "record --source a/b=images:camera -o r.mcap --overwrite",
+    ] {
+        coshade(folder.path(), args).failure(2);
+        assert!(
+            before == std::fs::read(folder.path().join("r.mcap")).unwrap(),
+            "coshade {args} changed the file"
+        );
+    }
+    let copied = "record --source a=replay:r.mcap#camera?rate=max -o copy.mcap --json";
+    assert_eq!(coshade(folder.path(), copied).success().json()["streams"][0]["written"], 3);
+}
+
+#[test]
+fn streams_keep_their_order() {
+    let folder = tempfile::tempdir().unwrap();
+    gradient_frames(&folder.path().join("frames"), 2, [16, 16]);
+    // The later sources deliver their first frame first: the earlier ones are large.
+    gradient_frames(&folder.path().join("large"), 2, [1024, 768]);
+    let record = "record --source z=images:large/*.png?pace=fast --source y=images:large/*.png?pace=fast \
+                  --source x=images:frames/*.png?pace=fast -o r.mcap --json";
+    coshade(folder.path(), record).success();
+    let info = coshade(folder.path(), "info r.mcap --json").success().json();
+    let names: Vec<_> =
+        info["content"]["streams"].as_array().unwrap().iter().map(|s| s["name"].clone()).collect();
+    assert_eq!(names, ["z", "y", "x"]);
+}
+
+#[test]
+fn a_start_behind_the_end_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    gradient_frames(&folder.path().join("camera"), 3, [16, 16]);
+    coshade(folder.path(), "record --source camera=images:camera/*.png?fps=100 -o r#1.mcap").success();
+    let refused = coshade(folder.path(), "replay r#1.mcap --start 100").failure(2);
+    assert!(refused.stderr.contains("--start 100"), "{}", refused.stderr);
+    assert!(coshade(folder.path(), "replay r#1.mcap --start -1").failure(2).stderr.contains("0 or more"));
+    coshade(folder.path(), "replay r#1.mcap --start 0.01 --rate max").success();
+    coshade(folder.path(), "replay r#1.mcap#camera --rate max").success();
+}
+
+#[test]
+fn what_16_bit_grey_means_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("frames")).unwrap();
+    let ramp = image::ImageBuffer::from_fn(8, 4, |x, _| image::Luma([250 * x as u16]));
+    ramp.save(folder.path().join("frames/ramp.png")).unwrap();
+
+    let grey = coshade(folder.path(), "info frames/ramp.png --json").success().json();
+    assert_eq!(grey["content"]["series"][0]["codes"], serde_json::json!([0, 1750]));
+    assert_eq!(grey["content"]["series"][0]["depth"], Value::Null);
+    assert!(grey["problems"][0]["message"].as_str().unwrap().contains("--depth-unit-m"), "{grey}");
+
+    for path in ["frames/ramp.png", "frames"] {
+        let depth =
+            coshade(folder.path(), &format!("info {path} --depth-unit-m 0.002 --json")).success().json();
+        let depth = &depth["content"]["series"][0]["depth"];
+        let close = |key: &str, expected: f64| (depth[key].as_f64().unwrap() - expected).abs() < 1e-9;
+        // One of eight columns is 0, which is no depth; the median of the others is the fourth of seven.
+        assert!(close("min_m", 0.5) && close("median_m", 2.0) && close("max_m", 3.5), "{depth}");
+        assert!(close("valid_share", 0.875), "{depth}");
+    }
+}
+
+#[test]
+fn folders_say_what_they_hold() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    for name in ["meshes", "tags", "broken"] {
+        std::fs::create_dir(folder.path().join(name)).unwrap();
+    }
+    write("meshes/a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    write("meshes/readme.txt", "");
+    let refused = coshade(folder.path(), "info meshes").failure(2).stderr;
+    assert!(refused.contains("look at one of a.obj") && !refused.contains("readme"), "{refused}");
+
+    write("broken/a.png", "nothing");
+    let broken = coshade(folder.path(), "info broken").failure(1).stdout;
+    assert!(broken.contains("error: ") && broken.contains("a.png"), "{broken}");
+
+    // A list of visible tags is called as lists of poses are.
+    gradient_frames(&folder.path().join("tags"), 2, [16, 16]);
+    write("tags/groundtruth.txt", "0000.png 13 19\n0001.png 11 13 19\n");
+    let count = || coshade(folder.path(), "info tags --json").success().json()["content"]["poses"].clone();
+    assert_eq!(count(), 0);
+    write("tags/groundtruth.txt", "# time tx ty tz qx qy qz qw\n1.5 0 0 0 0 0 0 1\n");
+    assert_eq!(count(), 1);
+}
+
+#[cfg(unix)]
+#[test]
+fn pipes_are_refused_instead_of_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = std::process::Command::new("mkfifo").arg(folder.path().join("pipe.mcap")).status();
+    if !made.is_ok_and(|status| status.success()) {
+        println!("skipped: pipes_are_refused_instead_of_waited_for: no mkfifo");
+        return;
+    }
+    for args in ["replay pipe.mcap", "info pipe.mcap", "record --source a=replay:pipe.mcap -o x.mcap"] {
+        let refused = coshade(folder.path(), args).failure(2).stderr;
+        assert!(refused.contains("pipe.mcap"), "coshade {args}: {refused}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    gradient_frames(&folder.path().join("camera"), 2, [16, 16]);
+    for args in [
+        "record --source a=images:camera?pace=fast -o /dev/full --overwrite",
+        "compare camera/0000.png camera/0001.png --diff /dev/full",
+    ] {
+        let refused = coshade(folder.path(), args).failure(2).stderr;
+        assert!(refused.contains("/dev/full"), "coshade {args}: {refused}");
+    }
+    assert!(std::path::Path::new("/dev/full").exists(), "a device is no leftover to remove");
 }

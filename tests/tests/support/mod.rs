@@ -45,7 +45,8 @@ impl Run {
 
     /// Its standard output must be one JSON object.
     pub fn json(&self) -> serde_json::Value {
-        serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("coshade {}: {error}\n{}", self.args, self.stdout))
+        serde_json::from_str(&self.stdout)
+            .unwrap_or_else(|error| panic!("coshade {}: {error}\n{}", self.args, self.stdout))
     }
 }
 
@@ -67,7 +68,9 @@ pub fn workspace(relative: &str) -> PathBuf {
 pub fn gradient_frames(folder: &Path, count: u32, [width, height]: [u32; 2]) {
     std::fs::create_dir_all(folder).unwrap();
     for index in 0..count {
-        let pixel = |x: u32, y: u32| Rgb([(x * 3 + index) as u8, (y * 5) as u8, (x ^ y).wrapping_add(7 * index) as u8]);
+        let pixel = |x: u32, y: u32| {
+            Rgb([(x * 3 + index) as u8, (y * 5) as u8, (x ^ y).wrapping_add(7 * index) as u8])
+        };
         RgbImage::from_fn(width, height, pixel).save(folder.join(format!("{index:04}.png"))).unwrap();
     }
 }
