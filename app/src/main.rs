@@ -24,6 +24,7 @@ enum Command {
     Replay(command::replay::Args),
     Compare(command::compare::Args),
     Reference(command::reference::Args),
+    Export(command::export::Args),
     Doctor(command::doctor::Args),
 }
 
@@ -43,6 +44,7 @@ fn main() -> ExitCode {
         Command::Replay(args) => command::replay::run(&args),
         Command::Compare(args) => command::compare::run(&args),
         Command::Reference(args) => command::reference::run(&args),
+        Command::Export(args) => command::export::run(&args),
         Command::Doctor(args) => command::doctor::run(&args),
     };
     match result {

@@ -13,6 +13,7 @@
 //! | [`photon`] | caustics by progressive photon mapping |
 //! | [`film`] | the picture with its layers |
 //! | [`job`] | rendering a picture: threads, passes, shards, limits |
+//! | [`mitsuba`] | a scene for the Mitsuba 3 renderer |
 //! | [`image_file`] | linear float images, single or layered, from and to EXR, Radiance HDR, PNG and JPEG |
 //! | [`compare`] | RMSE, PSNR, SSIM and FLIP of two images, whole and per set of pixels; difference pictures |
 
@@ -26,6 +27,7 @@ pub mod film;
 pub mod image_file;
 pub mod integrator;
 pub mod job;
+pub mod mitsuba;
 pub mod photon;
 pub mod random;
 pub mod surface;

@@ -3,6 +3,7 @@
 
 pub mod compare;
 pub mod doctor;
+pub mod export;
 pub mod info;
 pub mod print;
 pub mod record;

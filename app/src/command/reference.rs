@@ -143,7 +143,10 @@ fn trace(path: &Path, args: &Args) -> anyhow::Result<Film> {
         tracing::warn!("{warning}");
     }
     if let Some(&index) = assembled.lights_to_fit.first() {
-        bail!("{}: light[{index}] has fit = true, but there is no image to fit it to: state its strength", path.display());
+        bail!(
+            "{}: light[{index}] has fit = true, but there is no image to fit it to: state its strength",
+            path.display()
+        );
     }
     let scene = TraceScene::build(&assembled.scene, environment(&session)?, |_| None)
         .with_context(|| path.display().to_string())?;
@@ -159,8 +162,13 @@ fn trace(path: &Path, args: &Args) -> anyhow::Result<Film> {
     };
     let bar = ProgressBar::new(STEPS);
     bar.set_style(ProgressStyle::with_template("tracing {elapsed} {wide_bar} {msg}")?);
-    let film =
-        render(&scene, &camera(&session)?, &options, |progress| show(&bar, progress, &options), interrupt::on_ctrl_c()?);
+    let film = render(
+        &scene,
+        &camera(&session)?,
+        &options,
+        |progress| show(&bar, progress, &options),
+        interrupt::on_ctrl_c()?,
+    );
     bar.finish_and_clear();
     Ok(film?)
 }
@@ -168,7 +176,8 @@ fn trace(path: &Path, args: &Args) -> anyhow::Result<Film> {
 /// Of the limits, the one that is nearest.
 fn show(bar: &ProgressBar, progress: &Progress, options: &JobOptions) {
     let by_samples = f64::from(progress.samples) / f64::from(progress.samples_wanted);
-    let by_time = options.time_limit.map_or(0.0, |limit| progress.elapsed.as_secs_f64() / limit.as_secs_f64());
+    let by_time =
+        options.time_limit.map_or(0.0, |limit| progress.elapsed.as_secs_f64() / limit.as_secs_f64());
     // Noise falls with the square root of the work.
     let by_error = match (progress.relative_error, options.error_limit) {
         (Some(error), Some(limit)) => (limit / error).powi(2),
@@ -179,7 +188,7 @@ fn show(bar: &ProgressBar, progress: &Progress, options: &JobOptions) {
     bar.set_message(format!("{} of {} samples", progress.samples, progress.samples_wanted));
 }
 
-fn camera(session: &Session) -> anyhow::Result<Camera> {
+pub(super) fn camera(session: &Session) -> anyhow::Result<Camera> {
     let path = session.path();
     let spec = &session.spec().camera;
     let pose = spec.pose.as_ref().ok_or_else(|| {
@@ -193,11 +202,14 @@ fn camera(session: &Session) -> anyhow::Result<Camera> {
     Ok(Camera::new(model, size_px, world_from_camera)?)
 }
 
-fn environment(session: &Session) -> anyhow::Result<Option<Environment>> {
+pub(super) fn environment(session: &Session) -> anyhow::Result<Option<Environment>> {
     let path = session.path();
     let spec = session.spec();
     if spec.fisheye.is_some() {
-        tracing::warn!("{}: the light of the fish-eye is not traced, only [environment] and [[light]]", path.display());
+        tracing::warn!(
+            "{}: the light of the fish-eye is not traced, only [environment] and [[light]]",
+            path.display()
+        );
     }
     let Some(environment) = &spec.environment else { return Ok(None) };
     if environment.room.is_some() {
@@ -207,7 +219,10 @@ fn environment(session: &Session) -> anyhow::Result<Option<Environment>> {
     let image = image_file::read(&file)?.layers.into_iter().next().context("an image without layers")?.image;
     let negative = image.census().negative;
     if negative > 0 {
-        tracing::warn!("{}: {negative} samples below zero, as filters leave them, are taken as 0", file.display());
+        tracing::warn!(
+            "{}: {negative} samples below zero, as filters leave them, are taken as 0",
+            file.display()
+        );
     }
     let image = radiance(image, environment.scale as f32)?;
     let yaw_rad = environment.yaw_deg.to_radians() as f32;

@@ -157,6 +157,26 @@ impl Environment {
         World::Real
     }
 
+    /// How directions lie on it.
+    pub fn layout(&self) -> Layout {
+        self.layout
+    }
+
+    /// Columns and rows.
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+
+    /// Row by row.
+    pub fn texels(&self) -> &[Vec3] {
+        &self.texels
+    }
+
+    /// How far the map is turned counter-clockwise about the world's +Z.
+    pub fn yaw_rad(&self) -> f32 {
+        self.yaw.to_angle()
+    }
+
     /// Luminance integrated over all directions.
     pub fn luminance_sr(&self) -> f64 {
         self.cells.as_ref().map_or(0.0, Grid::total)
