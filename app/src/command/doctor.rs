@@ -86,11 +86,13 @@ fn table(checks: &[Check]) -> String {
     out
 }
 
-const INSTALL_VULKAN: &str = "sudo apt-get install libvulkan1 mesa-vulkan-drivers (or your GPU maker's driver)";
+const INSTALL_VULKAN: &str =
+    "sudo apt-get install libvulkan1 mesa-vulkan-drivers (or your GPU maker's driver)";
 
 fn vulkan_loader() -> Check {
     const NAME: &str = "Vulkan loader";
-    let library = library_folders().into_iter().map(|dir| dir.join("libvulkan.so.1")).find(|file| file.exists());
+    let library =
+        library_folders().into_iter().map(|dir| dir.join("libvulkan.so.1")).find(|file| file.exists());
     match library {
         Some(file) => Check::ok(NAME, file.display().to_string()),
         None => Check::bad(NAME, Status::Error, "libvulkan.so.1 not found", INSTALL_VULKAN),
@@ -122,7 +124,12 @@ fn vulkan_driver() -> Check {
         .collect();
     names.sort();
     if names.is_empty() {
-        return Check::bad(NAME, Status::Error, format!("no driver in {}", folders.join(", ")), INSTALL_VULKAN);
+        return Check::bad(
+            NAME,
+            Status::Error,
+            format!("no driver in {}", folders.join(", ")),
+            INSTALL_VULKAN,
+        );
     }
     Check::ok(NAME, names.join(", "))
 }
@@ -181,7 +188,8 @@ fn video_devices(dev: &Path) -> Vec<Check> {
 /// Vulkan drivers and windows keep their sockets there, and complain on standard error where it is missing.
 fn runtime_folder() -> Check {
     const NAME: &str = "runtime folder";
-    const CURE: &str = "export XDG_RUNTIME_DIR=/run/user/$(id -u), or any folder of yours that only you can read";
+    const CURE: &str =
+        "export XDG_RUNTIME_DIR=/run/user/$(id -u), or any folder of yours that only you can read";
     match std::env::var_os("XDG_RUNTIME_DIR") {
         Some(folder) if Path::new(&folder).is_dir() => Check::ok(NAME, folder.display().to_string()),
         Some(folder) => Check::bad(NAME, Status::Warning, format!("{} is no folder", folder.display()), CURE),
@@ -193,7 +201,9 @@ fn processor() -> Check {
     const NAME: &str = "processor";
     match std::thread::available_parallelism() {
         Ok(threads) => Check::ok(NAME, format!("{threads} threads")),
-        Err(error) => Check::bad(NAME, Status::Warning, error.to_string(), "number of threads unknown, using 1"),
+        Err(error) => {
+            Check::bad(NAME, Status::Warning, error.to_string(), "number of threads unknown, using 1")
+        }
     }
 }
 

@@ -13,7 +13,7 @@ use super::{print, reference};
 
 /// Write a session as a scene of another renderer.
 ///
-/// The session's camera must stand still ([camera] pose = …) and be a pinhole with fx = fy. Exact in Mitsuba: Lambert
+/// The session's camera must stand still (`pose` in `[camera]`) and be a pinhole with fx = fy. Exact in Mitsuba: Lambert
 /// (ior = 1), metal, smooth glass, area lights, the environment; the rest is approximated with a warning or refused with
 /// its name. Render with `mitsuba -Dspp=256 scene.xml`.
 #[derive(clap::Args)]

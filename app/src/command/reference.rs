@@ -24,7 +24,7 @@ const STEPS: u64 = 1000;
 
 /// Trace the truth of a session: the real room, and the room with the virtual things really in it.
 ///
-/// The session's camera must stand still ([camera] pose = …); light comes from [environment] and [[light]]. The EXR has
+/// The session's camera must stand still (`pose` in `[camera]`); light comes from `[environment]` and `[[light]]`. The EXR has
 /// layers `real`, `mixed`, `difference` (mixed − real), `depth_z_m` (or `range_m`), `normal`, `albedo`, `coverage` (share
 /// of the pixel that virtual things cover) and variances of the means. Same seed, same picture, whatever the number of
 /// threads. Ctrl-C writes what is done.
