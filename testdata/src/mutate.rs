@@ -99,7 +99,8 @@ mod tests {
         let seed = b"a file of some length, long enough to be damaged in many ways";
         let all: Vec<_> = mutations(seed, 200).map(|(_, bytes)| bytes).collect();
         assert_eq!(all, mutations(seed, 200).map(|(_, bytes)| bytes).collect::<Vec<_>>());
-        let distinct: std::collections::HashSet<_> = all.iter().filter(|bytes| bytes[..] != seed[..]).collect();
+        let distinct: std::collections::HashSet<_> =
+            all.iter().filter(|bytes| bytes[..] != seed[..]).collect();
         assert!(distinct.len() > 190, "{} distinct", distinct.len());
     }
 
