@@ -12,7 +12,6 @@ use coshade_lens::pixel::CameraPx;
 use coshade_sim::World;
 use coshade_sim::sensor::Exposure;
 use coshade_tracker::Family;
-use glam::DVec3;
 use nalgebra::{Vector2, Vector3};
 
 struct Detection {
@@ -73,7 +72,7 @@ fn detect(family: Family, grey: &mut [u8], [width, height]: [u32; 2]) -> Vec<Det
 ///
 /// The camera's response is linear: a detector takes the middle between black and white codes for an edge, and a response
 /// that brightens the half covered pixels moves that outwards (0.2 px with sRGB).
-fn world(folder: &Path, family: Family, id: u32) -> World {
+fn world(folder: &Path, family: Family, id: u32, [x_m, y_m, turn_deg]: [f64; 3]) -> World {
     let mut calibration = Calibration::default_for([160, 160], 30_f64.to_radians()).unwrap();
     calibration.response = Response::Linear;
     calibration.write(folder.join("camera.toml")).unwrap();
@@ -81,7 +80,7 @@ fn world(folder: &Path, family: Family, id: u32) -> World {
         "version = 1\nduration_s = 0.02\n[trace]\nsamples = 16\nmax_depth = 1\n\
          [[thing]]\nname = 'paper'\nworld = 'real'\nshape = {{ plane = [2, 2] }}\nmaterial = {{ base_color = [0.85, 0.85, 0.85] }}\n\
          pose = {{ in = 'world', position_m = [0, 0, -0.0002] }}\n\
-         [[tag]]\nfamily = '{family}'\nid = {id}\nsize_m = 0.2\npose = {{ position_m = [0.0013, -0.0021, 0], rotation_deg = [0, 0, 7] }}\n\
+         [[tag]]\nfamily = '{family}'\nid = {id}\nsize_m = 0.2\npose = {{ position_m = [{x_m}, {y_m}, 0], rotation_deg = [0, 0, {turn_deg}] }}\n\
          [[light]]\nkind = 'area'\nworld = 'real'\nsize_m = [4, 4]\nradiance = [0.9, 0.9, 0.9]\n\
          pose = {{ in = 'world', position_m = [0, 0, 1.5], rotation_deg = [180, 0, 0] }}\n\
          [[keyframe]]\ntime_s = 0\nposition_m = [0, 0, 1]\nlook_at_m = [0, 0, 0]\n\
@@ -90,36 +89,53 @@ fn world(folder: &Path, family: Family, id: u32) -> World {
     World::parse(&text, folder.join("tag.toml")).unwrap()
 }
 
+/// What the detector's corners miss the truth by, in pixels; the tag is found once, without a wrong bit.
+fn corner_errors_px(folder: &Path, family: Family, id: u32, place: [f64; 3]) -> [Vector2<f64>; 4] {
+    let world = world(folder, family, id, place);
+    let sensor = world.sensor("camera", Arc::new(world.tracer().unwrap())).unwrap();
+    let frame = sensor.frame(0, &Exposure::default()).unwrap();
+    assert_eq!(frame.format, PixelFormat::Grey);
+    let mut grey = vec![0; 160 * 160];
+    Converter::new().grey(&frame, &mut grey).unwrap();
+    let found = detect(family, &mut grey, [160, 160]);
+    let [detection] = found.as_slice() else { unreachable!("{family}: {} detections", found.len()) };
+    assert_eq!((detection.id, detection.hamming), (id as i32, 0), "{family}");
+    let camera_from_world = sensor.world_from_sensor(0.0).inverse();
+    let corners_m = world.tags().unwrap()[0].corners_m();
+    std::array::from_fn(|corner: usize| {
+        let local = camera_from_world.transform_point(corners_m[corner]);
+        let truth = sensor.calibration().model.project(&Vector3::new(local.x, local.y, local.z)).unwrap();
+        detection.corners[corner].0 - truth
+    })
+}
+
 #[test]
-fn printed_tags_are_found_where_they_are() {
-    // The last number of each family too: the bit order would show.
+fn printed_tags_of_all_families_are_found_where_they_are() {
     let folder = tempfile::tempdir().unwrap();
     for family in Family::ALL {
-        let id = family.tag_count() - 1;
-        let world = world(folder.path(), family, id);
-        let sensor = world.sensor("camera", Arc::new(world.tracer().unwrap())).unwrap();
-        let frame = sensor.frame(0, &Exposure::default()).unwrap();
-        assert_eq!(frame.format, PixelFormat::Grey);
-        let mut grey = vec![0; 160 * 160];
-        Converter::new().grey(&frame, &mut grey).unwrap();
-        let found = detect(family, &mut grey, [160, 160]);
-        let [detection] = found.as_slice() else { unreachable!("{family}: {} detections", found.len()) };
-        assert_eq!((detection.id, detection.hamming), (id as i32, 0), "{family}");
-        let camera_from_world = sensor.world_from_sensor(0.0).inverse();
-        let project = |corner_m: DVec3| -> Vector2<f64> {
-            let local = camera_from_world.transform_point(corner_m);
-            sensor.calibration().model.project(&Vector3::new(local.x, local.y, local.z)).unwrap()
-        };
-        let truth = world.tags().unwrap()[0].corners_m().map(project);
-        let worst = truth
-            .iter()
-            .zip(&detection.corners)
-            .map(|(truth, found)| (truth - found.0).norm())
-            .fold(0.0, f64::max);
-        for (t, f) in truth.iter().zip(&detection.corners) {
-            eprintln!("{family} {:?} {:?}", t, f.0 - t);
-        }
-        // What is asked of a detector on a sharp print; half a pixel of a wrong convention would be 0.7.
-        assert!(worst < 0.5, "{family}: {worst} px");
+        // The last number of each family: the bit order would show.
+        let errors = corner_errors_px(folder.path(), family, family.tag_count() - 1, [0.0013, -0.0021, 7.0]);
+        // The detector's own error in one image is up to 0.1 px here; half a pixel of a wrong convention would be 0.7.
+        assert!(errors.iter().all(|error| error.norm() < 0.15), "{family}: {errors:?}");
     }
+}
+
+#[test]
+fn corners_are_true_on_average_over_the_places_of_a_tag() {
+    let folder = tempfile::tempdir().unwrap();
+    // The detector takes gradients at the nearest pixel: its error depends on how edges cross the pixels, and averages out.
+    let places = [
+        [0.0, 0.0, 0.0],
+        [0.0013, -0.0021, 3.0],
+        [0.0024, 0.0009, -5.0],
+        [-0.0007, 0.0017, 11.0],
+        [0.0031, -0.0004, -8.0],
+        [-0.0019, -0.0012, 17.0],
+    ];
+    let mut mean = [Vector2::zeros(); 4];
+    for place in places {
+        let errors = corner_errors_px(folder.path(), Family::Tag36h11, 7, place);
+        mean.iter_mut().zip(errors).for_each(|(mean, error)| *mean += error / places.len() as f64);
+    }
+    assert!(mean.iter().all(|error| error.norm() < 0.05), "{mean:?}");
 }
