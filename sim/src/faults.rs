@@ -47,7 +47,7 @@ pub enum FaultSpec {
         #[schemars(range(min = 0.0, max = 3.0))]
         amplitude: f64,
         /// Of one swing.
-        #[schemars(extend("exclusiveMinimum" = 0))]
+        #[schemars(range(min = 0.001))]
         period_s: f64,
     },
     /// Frames with a wrong time stamp.
