@@ -138,9 +138,18 @@ fn lenses_that_mitsuba_lacks_are_refused() {
 #[test]
 fn the_principal_point_is_an_offset_of_the_film() {
     let xml = sensor::sensor(&camera(SQUARE)).unwrap().to_string();
-    assert!(xml.contains("principal_point_offset_x\" value=\"-0.00250"), "{xml}");
-    assert!(xml.contains("principal_point_offset_y\" value=\"0.11875\""), "{xml}");
-    assert!(xml.contains("name=\"fov\" value=\"53.13010235415"), "{xml}");
+    let number = |name: &str| -> f64 {
+        let rest = xml.split(&format!("\"{name}\" value=\"")).nth(1).unwrap();
+        rest.split('"').next().unwrap().parse().unwrap()
+    };
+    let expected = [
+        ("principal_point_offset_x", -0.0025),
+        ("principal_point_offset_y", 0.11875),
+        ("fov", 2.0 * 0.5_f64.atan().to_degrees()),
+    ];
+    for (name, expected) in expected {
+        assert!((number(name) - expected).abs() < 1e-12, "{name} = {}, expected {expected}", number(name));
+    }
 }
 
 /// Mitsuba looks up `u = atan2(x, −z)/2π`, `v = acos(y)/π`, with texel k at (k + ½)/width and row j at j/(rows − 1).
