@@ -24,6 +24,7 @@ enum Command {
     Replay(command::replay::Args),
     Compare(command::compare::Args),
     Reference(command::reference::Args),
+    Simulate(command::simulate::Args),
     Export(command::export::Args),
     Doctor(command::doctor::Args),
 }
@@ -44,6 +45,7 @@ fn main() -> ExitCode {
         Command::Replay(args) => command::replay::run(&args),
         Command::Compare(args) => command::compare::run(&args),
         Command::Reference(args) => command::reference::run(&args),
+        Command::Simulate(args) => command::simulate::run(&args),
         Command::Export(args) => command::export::run(&args),
         Command::Doctor(args) => command::doctor::run(&args),
     };

@@ -10,7 +10,9 @@ use coshade_scene::session::source::SourceUri;
 
 /// Every scheme of every crate.
 pub fn registry() -> SourceRegistry {
-    SourceRegistry::builtin()
+    let mut registry = SourceRegistry::builtin();
+    coshade_sim::source::register(&mut registry);
+    registry
 }
 
 /// A sensor that a session names, with paths as this process sees them.

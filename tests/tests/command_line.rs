@@ -265,3 +265,31 @@ fn a_full_disk_is_named() {
     }
     assert!(std::path::Path::new("/dev/full").exists(), "a device is no leftover to remove");
 }
+
+#[test]
+fn a_described_world_becomes_a_recording_and_a_camera() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["desk.toml", "board.toml"] {
+        std::fs::copy(workspace("sim/tests/data").join(name), folder.path().join(name)).unwrap();
+    }
+    let described = coshade(folder.path(), "info desk.toml --json").success().json();
+    assert_eq!(described["kind"], "world");
+    assert_eq!(coshade(folder.path(), "info board.toml --json").success().json()["kind"], "board");
+
+    let simulated = coshade(folder.path(), "simulate desk.toml -o w.mcap --no-cache --json").success().json();
+    let recorded = coshade(folder.path(), "info w.mcap --json").success().json();
+    for (told, found) in simulated["streams"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip(recorded["content"]["streams"].as_array().unwrap())
+    {
+        assert_eq!((&told["name"], &told["written"]), (&found["name"], &found["frames"]));
+        assert_eq!(found["calibration"], true);
+    }
+    assert!(folder.path().join("w.truth.json").exists());
+
+    let live = "record --source camera=sim:desk.toml#camera?pace=fast&cache=cache -o live.mcap --json";
+    let live = coshade(folder.path(), live).success().json();
+    assert_eq!(live["streams"][0]["written"], simulated["streams"][0]["written"]);
+}

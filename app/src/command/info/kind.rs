@@ -27,6 +27,10 @@ pub enum Kind {
     Session,
     /// Where the sensors of a rig sit.
     Rig,
+    /// A printed board of tags.
+    Board,
+    /// A world to be simulated.
+    World,
 }
 
 impl Kind {
@@ -41,6 +45,8 @@ impl Kind {
             Self::Calibration => "camera calibration",
             Self::Session => "session",
             Self::Rig => "rig",
+            Self::Board => "board of tags",
+            Self::World => "simulated world",
         }
     }
 }
@@ -121,10 +127,39 @@ fn by_keys(path: &Path) -> anyhow::Result<Kind> {
     }
     let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
     let text = String::from_utf8_lossy(&bytes);
-    let has = |key: &str| text.lines().any(|line| line.trim_start().starts_with(key));
+    let keys = top_level_keys(&text);
+    let has = |names: &[&str]| names.iter().any(|name| keys.contains(name));
     Ok(match () {
-        () if has("[lens]") || has("size_px") || has("[response]") => Kind::Calibration,
-        () if has("[sensor") => Kind::Rig,
+        () if has(&["lens", "size_px", "response", "vignetting"]) => Kind::Calibration,
+        () if has(&["keyframe", "trace"]) => Kind::World,
+        () if has(&["tag", "family"]) => Kind::Board,
+        () if has(&["sensor"]) => Kind::Rig,
         () => Kind::Session,
     })
+}
+
+/// Keys and tables of the first level, also of a text that is no valid TOML: its errors should be those of its kind.
+fn top_level_keys(text: &str) -> Vec<&str> {
+    let mut in_root = true;
+    let mut keys = Vec::new();
+    for line in text.lines().map(str::trim_start).filter(|line| !line.starts_with('#')) {
+        if let Some(header) = line.strip_prefix('[') {
+            in_root = false;
+            keys.extend(header.trim_start_matches('[').split(['.', ']']).next().map(str::trim));
+        } else if in_root && let Some((key, _)) = line.split_once('=') {
+            keys.extend(key.split('.').next().map(str::trim));
+        }
+    }
+    keys
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_keys_of_the_first_level_tell_what_a_file_is() {
+        let text = "version = 1\n# lens = 2\n[camera]\nsource = 'x'\n[camera.controls]\nsize_px = [4, 3]\n[[thing]]\n";
+        assert_eq!(top_level_keys(text), ["version", "camera", "camera", "thing"]);
+    }
 }

@@ -1,5 +1,6 @@
 //! `coshade info`: what is in a file or folder, and what is wrong with it.
 
+mod board;
 mod calibration;
 mod folder;
 mod kind;
@@ -8,6 +9,7 @@ mod picture;
 mod recording;
 mod rig;
 mod session;
+mod world;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -20,7 +22,7 @@ use kind::Kind;
 
 /// Say what is in a file or folder, and what is wrong with it.
 ///
-/// Knows recordings (MCAP, ROS 1 bags), calibration, rig and session files, meshes (glTF, OBJ, PLY), images (EXR, HDR,
+/// Knows recordings (MCAP, ROS 1 bags), calibration, rig, board, world and session files, meshes (glTF, OBJ, PLY), images (EXR, HDR,
 /// PNG, JPEG, PGM) and folders of images (also TUM RGB-D, 7-Scenes). Exit code 1 if something is wrong with the file, 2
 /// if it cannot be read.
 #[derive(clap::Args)]
@@ -104,6 +106,8 @@ fn look(path: &Path, depth_unit_m: Option<f64>) -> anyhow::Result<Info> {
         Kind::Calibration => calibration::look(path),
         Kind::Session => session::look(path),
         Kind::Rig => rig::look(path),
+        Kind::Board => board::look(path),
+        Kind::World => world::look(path),
     }?;
     Ok(Info {
         path: path.display().to_string(),
