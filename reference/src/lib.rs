@@ -14,7 +14,6 @@
 //! | [`film`] | the picture with its layers |
 //! | [`job`] | rendering a picture: threads, passes, shards, limits |
 //! | [`mitsuba`] | a scene for the Mitsuba 3 renderer |
-//! | [`image_file`] | linear float images, single or layered, from and to EXR, Radiance HDR, PNG and JPEG |
 //! | [`compare`] | RMSE, PSNR, SSIM and FLIP of two images, whole and per set of pixels; difference pictures |
 
 pub mod accel;
@@ -24,7 +23,6 @@ pub mod compare;
 pub mod differential;
 pub mod emitter;
 pub mod film;
-pub mod image_file;
 pub mod integrator;
 pub mod job;
 pub mod mitsuba;

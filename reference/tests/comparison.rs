@@ -3,11 +3,11 @@
 
 use std::sync::Arc;
 
+use coshade_image_file::{BitDepth, Image, LayeredImage, Precision, write_exr, write_png};
 use coshade_reference::compare::{
     CompareArgs, CompareError, CompareOptions, Comparison, DisplayTransform, Named, compare,
     difference_picture, flip_picture, run,
 };
-use coshade_reference::image_file::{BitDepth, Image, LayeredImage, Precision, write_exr, write_png};
 use glam::Vec3;
 
 fn colour(width: usize, height: usize, pixel: impl Fn(usize, usize) -> Vec3) -> Image {
@@ -35,7 +35,7 @@ fn constant_difference() {
     assert!(close(figures.max_abs_difference, 3.0));
     assert_eq!(figures.mean_difference["R"], 0.25);
     assert_eq!(figures.mean_difference["B"], -0.25);
-    let display = coshade_reference::image_file::srgb::encode;
+    let display = coshade_image_file::srgb::encode;
     let step = display(0.5) - display(0.25);
     let rmse_display = (2.0 * step * step / 3.0).sqrt();
     assert!(close(figures.rmse_display, rmse_display));

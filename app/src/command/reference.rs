@@ -5,11 +5,11 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow, bail};
+use coshade_image_file::{Image, Precision};
 use coshade_lens::calibration::Calibration;
 use coshade_reference::camera::Camera;
 use coshade_reference::emitter::{Environment, Interpolation, Layout};
 use coshade_reference::film::{Film, merge};
-use coshade_reference::image_file::{self, Image, Precision};
 use coshade_reference::integrator::{Settings, TraceScene};
 use coshade_reference::job::{JobOptions, Progress, Shard, render};
 use coshade_scene::session::Session;
@@ -216,7 +216,7 @@ pub(super) fn environment(session: &Session) -> anyhow::Result<Option<Environmen
         tracing::warn!("{}: the environment is traced as infinitely far, not as a room", path.display());
     }
     let file = session.resolve(&environment.file);
-    let image = image_file::read(&file)?.layers.into_iter().next().context("an image without layers")?.image;
+    let image = coshade_image_file::read(&file)?.layers.into_iter().next().context("an image without layers")?.image;
     let negative = image.census().negative;
     if negative > 0 {
         tracing::warn!(

@@ -1,6 +1,6 @@
 //! Colours for signed and unsigned figures.
 
-use crate::image_file::srgb;
+use coshade_image_file::srgb;
 
 /// A diverging map in CIELAB: blue for −1, light grey for 0, red for +1, equal steps of lightness and chroma.
 ///

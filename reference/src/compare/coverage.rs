@@ -1,5 +1,5 @@
 use super::CompareError;
-use crate::image_file::Image;
+use coshade_image_file::Image;
 
 /// Coverage this near to 0 or 1 counts as that: sums of sample weights in `f32` miss it by rounding.
 const ROUNDING: f32 = 1e-4;

@@ -1,7 +1,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use crate::image_file::srgb;
+use coshade_image_file::srgb;
 
 /// A camera's response: channel (0, 1, 2 = R, G, B; 0 for grey) and linear radiance in, code value of [0, 1] out.
 pub type Response = Arc<dyn Fn(usize, f32) -> f32 + Send + Sync>;

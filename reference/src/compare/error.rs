@@ -1,4 +1,4 @@
-use crate::image_file::ImageError;
+use coshade_image_file::ImageError;
 
 /// Why two images cannot be compared. Every message names both.
 #[derive(Debug, thiserror::Error)]

@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use super::plane::{Grid, convolve_separable};
-use crate::image_file::srgb;
+use coshade_image_file::srgb;
 
 /// The authors' default viewing condition: a 0.7 m wide 4K display seen from 0.7 m.
 pub const PIXELS_PER_DEGREE: f64 = 67.0;

@@ -30,7 +30,7 @@ pub use picture::{DifferencePicture, Picture, difference_picture, flip_picture};
 pub use report::{Figures, InputInfo, Report, SetFigures};
 pub use run::{CompareArgs, run};
 
-use crate::image_file::Image;
+use coshade_image_file::Image;
 use coverage::PixelSet;
 use figures::Maps;
 use plane::Grid;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::prepare::Prepared;
 use super::{CompareError, Comparison, colour_map, font};
-use crate::image_file::{ImageError, write_png_rgb8};
+use coshade_image_file::{ImageError, write_png_rgb8};
 
 const BLACK: [u8; 3] = [0; 3];
 const WHITE: [u8; 3] = [255; 3];

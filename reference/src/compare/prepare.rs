@@ -3,7 +3,7 @@ use rayon::prelude::*;
 use super::display::DisplayTransform;
 use super::plane::Grid;
 use super::{CompareError, Named};
-use crate::image_file::{ColourKind, Image};
+use coshade_image_file::{ColourKind, Image};
 
 /// Two images checked to fit each other: their compared planes and which pixels count.
 pub(super) struct Prepared<'a> {

@@ -4,7 +4,7 @@ use super::{
     CompareError, CompareOptions, DisplayTransform, Named, Report, Response, compare, difference_picture,
     flip_picture,
 };
-use crate::image_file::{ImageSpec, read_spec};
+use coshade_image_file::{ImageSpec, read_spec};
 
 /// The arguments of `coshade compare A B`.
 #[derive(Clone)]

@@ -15,7 +15,7 @@ use thiserror::Error;
 
 use super::distribution::Grid;
 use crate::bsdf::luminance;
-use crate::image_file::Image;
+use coshade_image_file::Image;
 
 /// How directions lie on the map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use glam::Vec3;
 use thiserror::Error;
 
 use super::{Film, FilmPixel, ShardMark};
-use crate::image_file::{Channel, Image, ImageError, LayeredImage};
+use coshade_image_file::{Channel, Image, ImageError, LayeredImage};
 
 /// Why an image is no film.
 #[derive(Debug, Error)]

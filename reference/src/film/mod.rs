@@ -30,7 +30,7 @@ pub use layers::FilmError;
 pub use merge::{MAX_SHARDS, MergeError, ShardMark, merge};
 pub use pixel::{FilmPixel, PixelSums};
 
-use crate::image_file::{ImageError, Precision, write_exr};
+use coshade_image_file::{ImageError, Precision, write_exr};
 
 /// A finished picture, or a shard's part of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -135,7 +135,7 @@ impl Film {
     /// [`FilmError`] if the file cannot be read or lacks a layer.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, FilmError> {
         let path = path.as_ref();
-        Self::from_layers(&crate::image_file::read(path)?)
+        Self::from_layers(&coshade_image_file::read(path)?)
             .map_err(|error| FilmError::InFile { path: path.into(), error: Box::new(error) })
     }
 }

@@ -84,8 +84,8 @@ fn a_film_survives_its_file() {
 fn a_picture_of_something_else_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("other.exr");
-    let image = crate::image_file::Image::from_rgb(1, 1, &[Vec3::ONE]).unwrap();
-    write_exr(&path, &crate::image_file::LayeredImage::single(image), Precision::Float).unwrap();
+    let image = coshade_image_file::Image::from_rgb(1, 1, &[Vec3::ONE]).unwrap();
+    write_exr(&path, &coshade_image_file::LayeredImage::single(image), Precision::Float).unwrap();
     let message = Film::read(&path).unwrap_err().to_string();
     assert!(message.contains("other.exr") && message.contains("samples"), "{message}");
 }

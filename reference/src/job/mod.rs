@@ -10,7 +10,8 @@
 //!
 //! ```no_run
 //! # use std::sync::atomic::AtomicBool;
-//! # use coshade_reference::{camera::Camera, integrator::TraceScene, image_file::Precision};
+//! # use coshade_image_file::Precision;
+//! # use coshade_reference::{camera::Camera, integrator::TraceScene};
 //! # use coshade_reference::job::{JobOptions, render};
 //! # fn run(scene: &TraceScene, camera: &Camera) -> Result<(), Box<dyn std::error::Error>> {
 //! let options = JobOptions { samples: 256, error_limit: Some(0.02), ..JobOptions::default() };

@@ -6,7 +6,7 @@ use glam::{DMat4, DVec3, DVec4, Vec3};
 
 use super::xml::Element;
 use crate::emitter::Environment;
-use crate::image_file::{Image, ImageError};
+use coshade_image_file::{Image, ImageError};
 
 /// What a spot loses.
 pub const SPOT_APPROXIMATION: &str =

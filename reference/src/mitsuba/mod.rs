@@ -26,7 +26,7 @@ use thiserror::Error;
 
 use crate::camera::Camera;
 use crate::emitter::{Environment, Layout};
-use crate::image_file::{Image, ImageError, LayeredImage, Precision, write_exr};
+use coshade_image_file::{Image, ImageError, LayeredImage, Precision, write_exr};
 use crate::integrator::Settings;
 use xml::Element;
 

@@ -3,10 +3,10 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use coshade_image_file::Precision;
 use coshade_lens::model::{Intrinsics, KannalaBrandt4, Pinhole};
 use coshade_reference::camera::Camera;
 use coshade_reference::film::{Film, merge};
-use coshade_reference::image_file::Precision;
 use coshade_reference::integrator::TraceScene;
 use coshade_reference::job::{JobError, JobOptions, Shard, render};
 use coshade_scene::shape::sphere;

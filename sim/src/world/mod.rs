@@ -11,7 +11,6 @@ use std::sync::Arc;
 use coshade_config::{Document, Error, Problem};
 use coshade_lens::calibration::{Calibration, CalibrationError};
 use coshade_reference::emitter::{Environment, Interpolation, Layout};
-use coshade_reference::image_file;
 use coshade_reference::integrator::{TraceError, TraceScene};
 use coshade_tracker::Board;
 use glam::{DVec3, Vec3};
@@ -197,7 +196,7 @@ impl World {
         let Some(spec) = &self.spec().environment else { return Ok(None) };
         let path = self.resolve(&spec.file);
         let unusable = |reason: String| WorldError::Environment { path: path.clone(), reason };
-        let layered = image_file::read(&path).map_err(|error| unusable(error.to_string()))?;
+        let layered = coshade_image_file::read(&path).map_err(|error| unusable(error.to_string()))?;
         let image = &layered.layers.first().ok_or_else(|| unusable("no image in it".into()))?.image;
         let plane = |name: &str| {
             let channel = image.channels().iter().find(|channel| channel.name == name);

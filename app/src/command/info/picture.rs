@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use coshade_reference::image_file::{self, Channel, Layer};
+use coshade_image_file::{Channel, Layer};
 use image::{ColorType, ImageDecoder as _, ImageFormat};
 use serde_json::json;
 
@@ -14,7 +14,7 @@ pub fn look(path: &Path, depth_unit_m: Option<f64>) -> anyhow::Result<Found> {
     if coding == Coding::Grey16 {
         return folder::look_at_file(path, depth_unit_m);
     }
-    let image = image_file::read(path)?;
+    let image = coshade_image_file::read(path)?;
     let mut text = match coding {
         Coding::Linear => String::from("  values are linear, 1 = white\n"),
         _ => String::from("  values are linear, 1 = white, decoded from sRGB\n"),

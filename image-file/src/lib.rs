@@ -20,9 +20,9 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+pub use self::image::{Channel, ColourKind, Image, Layer, LayeredImage, SampleCensus, Window};
 pub use error::ImageError;
 pub use exr_write::{Precision, write_exr};
-pub use image::{Channel, ColourKind, Image, Layer, LayeredImage, SampleCensus, Window};
 pub use png_jpeg::{BitDepth, write_png, write_png_rgb8};
 pub use spec::{ImageSpec, read_spec};
 

@@ -37,7 +37,7 @@ pub enum ImageError {
         /// What it uses, and what to do about it.
         what: String,
     },
-    /// The header asks for more than [`super::ReadLimits`] allows.
+    /// The header asks for more than [`crate::ReadLimits`] allows.
     #[error(
         "{path}: {width}x{height} px with {channels} channels is over the read limit \
          ({limit_side_px} px a side, {limit_bytes} bytes of decoded samples)",
@@ -52,9 +52,9 @@ pub enum ImageError {
         height: usize,
         /// Claimed number of channels.
         channels: usize,
-        /// [`super::ReadLimits::max_decoded_bytes`].
+        /// [`crate::ReadLimits::max_decoded_bytes`].
         limit_bytes: u64,
-        /// [`super::ReadLimits::max_side_px`].
+        /// [`crate::ReadLimits::max_side_px`].
         limit_side_px: usize,
     },
     /// A layer was asked for that the file does not have, or none was and there is a choice.

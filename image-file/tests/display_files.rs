@@ -3,9 +3,7 @@
 
 use std::path::Path;
 
-use coshade_reference::image_file::{
-    BitDepth, Channel, Image, ReadLimits, read, read_bytes, srgb, write_png,
-};
+use coshade_image_file::{BitDepth, Channel, Image, ReadLimits, read, read_bytes, srgb, write_png};
 
 fn ramp(names: &[&str]) -> Image {
     let samples = |index: usize| (0..256).map(|i| ((i + index * 40) % 256) as f32 / 255.0).collect();

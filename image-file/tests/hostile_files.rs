@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use coshade_reference::image_file::{ReadLimits, read_bytes};
+use coshade_image_file::{BitDepth, Channel, Image, ReadLimits, read_bytes, write_png};
 use coshade_testdata::mutate::mutations;
 
 static LIVE: AtomicUsize = AtomicUsize::new(0);
@@ -49,10 +49,21 @@ fn seeds(format: &str) -> Vec<Vec<u8>> {
             names.sort();
             names.iter().map(|path| std::fs::read(path).unwrap()).collect()
         }
-        "png" => all(&["pairs/noise_a.png", "pairs/blur_a.png"]),
+        "png" => vec![png(&["R", "G", "B"], BitDepth::Eight), png(&["Y", "A"], BitDepth::Sixteen)],
         "jpg" => all(&["small.jpg", "small_progressive.jpg"]),
         _ => vec![radiance(true), radiance(false)],
     }
+}
+
+/// A PNG of 32×24 px with the given channels.
+fn png(names: &[&str], depth: BitDepth) -> Vec<u8> {
+    let plane = |channel: usize| (0..32 * 24).map(|i| ((i * (7 + channel) / 3) % 64) as f32 / 63.0).collect();
+    let channels = names.iter().enumerate();
+    let channels = channels.map(|(index, name)| Channel { name: (*name).into(), samples: plane(index) });
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("seed.png");
+    write_png(&path, &Image::new(32, 24, channels.collect()).unwrap(), depth).unwrap();
+    std::fs::read(path).unwrap()
 }
 
 /// A Radiance picture of 40×12 px, with component runs or plain.

@@ -11,7 +11,7 @@ pub fn encode(linear: f64) -> f64 {
 }
 
 /// [`encode`] of a value clipped to [0, 1], as an integer code of `0..=max_code`, rounded to nearest.
-pub(crate) fn encode_to_code(linear: f32, max_code: u16) -> u16 {
+pub fn encode_to_code(linear: f32, max_code: u16) -> u16 {
     let code = encode(f64::from(linear).clamp(0.0, 1.0));
     (code * f64::from(max_code)).round() as u16
 }

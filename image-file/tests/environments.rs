@@ -1,6 +1,6 @@
 //! Real environment maps against what OpenEXR and OpenCV read in them (`tests/data/read_environments.py`).
 
-use coshade_reference::image_file::read;
+use coshade_image_file::read;
 
 #[test]
 fn real_maps_read_as_other_readers_read_them() {

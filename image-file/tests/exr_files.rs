@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use coshade_reference::image_file::{
+use coshade_image_file::{
     Channel, Image, ImageError, ImageSpec, LayeredImage, Precision, ReadLimits, read, read_bytes,
     read_with_limits, write_exr,
 };
