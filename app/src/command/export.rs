@@ -9,7 +9,7 @@ use coshade_reference::mitsuba::MitsubaScene;
 use coshade_scene::session::Session;
 use serde::Serialize;
 
-use super::{print, reference};
+use super::{print, traced};
 
 /// Write a session as a scene of another renderer.
 ///
@@ -50,21 +50,11 @@ struct Summary<'a> {
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let session = Session::read(&args.session)?;
     let place = || args.session.display().to_string();
-    let assembled = session.assemble()?;
-    for warning in &assembled.warnings {
-        tracing::warn!("{warning}");
-    }
-    if let Some(&index) = assembled.lights_to_fit.first() {
-        bail!(
-            "{}: light[{index}] has fit = true, but there is no image to fit it to: state its strength",
-            place()
-        );
-    }
-    let environment = reference::environment(&session)?;
-    let camera = reference::camera(&session)?;
+    let things = traced::assembled(&session)?;
+    let environment = traced::environment(&session)?;
+    let camera = traced::camera(&session)?;
     let mixed = args.world == WorldArg::Mixed;
-    let scene =
-        MitsubaScene::new(&assembled.scene, environment.as_ref(), &camera, mixed).with_context(place)?;
+    let scene = MitsubaScene::new(&things, environment.as_ref(), &camera, mixed).with_context(place)?;
     let approximations = scene.approximations();
     if args.exact && !approximations.is_empty() {
         bail!("{}: not exact, so nothing was written: {}", place(), approximations.join("; "));

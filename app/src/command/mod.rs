@@ -10,6 +10,7 @@ pub mod record;
 pub mod reference;
 pub mod replay;
 pub mod simulate;
+pub mod traced;
 
 /// A length of time, of an argument in seconds: ten years at most, so that sums with it stay in range.
 fn seconds(text: &str) -> Result<std::time::Duration, String> {

@@ -4,37 +4,38 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
-use anyhow::{Context as _, anyhow, bail};
-use coshade_image_file::{Image, Precision};
-use coshade_lens::calibration::Calibration;
-use coshade_reference::camera::Camera;
-use coshade_reference::emitter::{Environment, Interpolation, Layout};
+use anyhow::{Context as _, bail};
+use coshade_image_file::Precision;
 use coshade_reference::film::{Film, merge};
-use coshade_reference::integrator::{Settings, TraceScene};
+use coshade_reference::integrator::Settings;
 use coshade_reference::job::{JobOptions, Progress, Shard, render};
-use coshade_scene::session::Session;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use super::print;
+use super::traced::Traced;
 use crate::interrupt;
 
 /// Steps of the progress bar.
 const STEPS: u64 = 1000;
 
-/// Trace the truth of a session: the real room, and the room with the virtual things really in it.
+/// Trace the truth: the real room, and the room with the virtual things really in it.
 ///
-/// The session's camera must stand still (`pose` in `[camera]`); light comes from `[environment]` and `[[light]]`. The EXR has
+/// Of a session, whose camera must stand still (`pose` in `[camera]`), or of what a sensor of a simulated world sees in one of its frames.
+/// Light comes from `[environment]` and `[[light]]`. The EXR has
 /// layers `real`, `mixed`, `difference` (mixed − real), `depth_z_m` (or `range_m`), `normal`, `albedo`, `coverage` (share
 /// of the pixel that virtual things cover) and variances of the means. Same seed, same picture, whatever the number of
 /// threads. Ctrl-C writes what is done.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Session file
-    #[arg(required_unless_present = "merge")]
-    session: Option<PathBuf>,
+    /// Session file, or a world file and one of its sensors, such as desk.toml#camera
+    #[arg(value_name = "SESSION|WORLD#SENSOR", required_unless_present = "merge")]
+    scene: Option<String>,
+    /// Which frame of a world's sensor, from 0; the whole picture is of the middle of its exposure
+    #[arg(long, value_name = "N", conflicts_with = "merge")]
+    frame: Option<u64>,
     /// Put these shards together instead of tracing
-    #[arg(long, value_name = "EXR", num_args = 1.., conflicts_with = "session")]
+    #[arg(long, value_name = "EXR", num_args = 1.., conflicts_with = "scene")]
     merge: Vec<PathBuf>,
     /// The picture to write
     #[arg(short, long, value_name = "EXR")]
@@ -83,8 +84,8 @@ struct Summary {
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     check_output(&args.output)?;
     let begun = coshade_capture::clock::now();
-    let film = match &args.session {
-        Some(session) => trace(session, args)?,
+    let film = match &args.scene {
+        Some(name) => trace(name, args)?,
         None => merged(&args.merge)?,
     };
     let whole = args.shard.count == 1;
@@ -136,20 +137,8 @@ fn merged(shards: &[PathBuf]) -> anyhow::Result<Film> {
     merge(&films).with_context(|| format!("cannot merge {}", names.join(", ")))
 }
 
-fn trace(path: &Path, args: &Args) -> anyhow::Result<Film> {
-    let session = Session::read(path)?;
-    let assembled = session.assemble()?;
-    for warning in &assembled.warnings {
-        tracing::warn!("{warning}");
-    }
-    if let Some(&index) = assembled.lights_to_fit.first() {
-        bail!(
-            "{}: light[{index}] has fit = true, but there is no image to fit it to: state its strength",
-            path.display()
-        );
-    }
-    let scene = TraceScene::build(&assembled.scene, environment(&session)?, |_| None)
-        .with_context(|| path.display().to_string())?;
+fn trace(name: &str, args: &Args) -> anyhow::Result<Film> {
+    let Traced { scene, camera } = Traced::read(name, args.frame)?;
     let options = JobOptions {
         samples: args.samples,
         time_limit: args.seconds,
@@ -162,13 +151,8 @@ fn trace(path: &Path, args: &Args) -> anyhow::Result<Film> {
     };
     let bar = ProgressBar::new(STEPS);
     bar.set_style(ProgressStyle::with_template("tracing {elapsed} {wide_bar} {msg}")?);
-    let film = render(
-        &scene,
-        &camera(&session)?,
-        &options,
-        |progress| show(&bar, progress, &options),
-        interrupt::on_ctrl_c()?,
-    );
+    let film =
+        render(&scene, &camera, &options, |progress| show(&bar, progress, &options), interrupt::on_ctrl_c()?);
     bar.finish_and_clear();
     Ok(film?)
 }
@@ -186,58 +170,6 @@ fn show(bar: &ProgressBar, progress: &Progress, options: &JobOptions) {
     let done = by_samples.max(by_time).max(by_error).clamp(0.0, 1.0);
     bar.set_position((done * STEPS as f64) as u64);
     bar.set_message(format!("{} of {} samples", progress.samples, progress.samples_wanted));
-}
-
-pub(super) fn camera(session: &Session) -> anyhow::Result<Camera> {
-    let path = session.path();
-    let spec = &session.spec().camera;
-    let pose = spec.pose.as_ref().ok_or_else(|| {
-        anyhow!("{}: the camera has no place: write [camera] pose = {{ in = \"world\", … }}", path.display())
-    })?;
-    let calibration = spec.calibration.as_ref().ok_or_else(|| {
-        anyhow!("{}: the camera has no lens: write [camera] calibration = \"camera.toml\"", path.display())
-    })?;
-    let Calibration { model, size_px, .. } = Calibration::read(session.resolve(calibration))?;
-    let world_from_camera = *session.pose(pose)?.frame_from_thing();
-    Ok(Camera::new(model, size_px, world_from_camera)?)
-}
-
-pub(super) fn environment(session: &Session) -> anyhow::Result<Option<Environment>> {
-    let path = session.path();
-    let spec = session.spec();
-    if spec.fisheye.is_some() {
-        tracing::warn!(
-            "{}: the light of the fish-eye is not traced, only [environment] and [[light]]",
-            path.display()
-        );
-    }
-    let Some(environment) = &spec.environment else { return Ok(None) };
-    if environment.room.is_some() {
-        tracing::warn!("{}: the environment is traced as infinitely far, not as a room", path.display());
-    }
-    let file = session.resolve(&environment.file);
-    let image = coshade_image_file::read(&file)?.layers.into_iter().next().context("an image without layers")?.image;
-    let negative = image.census().negative;
-    if negative > 0 {
-        tracing::warn!(
-            "{}: {negative} samples below zero, as filters leave them, are taken as 0",
-            file.display()
-        );
-    }
-    let image = radiance(image, environment.scale as f32)?;
-    let yaw_rad = environment.yaw_deg.to_radians() as f32;
-    let environment = Environment::from_image(Layout::LatLong, &image, Interpolation::default(), yaw_rad);
-    Ok(Some(environment.with_context(|| file.display().to_string())?))
-}
-
-/// Samples times `factor`, none below zero. What is no number stays, to be refused with its place.
-fn radiance(image: Image, factor: f32) -> anyhow::Result<Image> {
-    let (width, height) = (image.width(), image.height());
-    let mut channels = image.channels().to_vec();
-    for sample in channels.iter_mut().flat_map(|channel| &mut channel.samples) {
-        *sample = if *sample < 0.0 { 0.0 } else { *sample * factor };
-    }
-    Ok(Image::new(width, height, channels)?)
 }
 
 fn seconds(text: &str) -> Result<Duration, String> {

@@ -5,6 +5,7 @@
 //! | [`lamp`] | discs with a cone, rectangles |
 //! | [`glow`] | triangles of an emissive material |
 //! | [`environment`] | radiance from far away |
+//! | [`environment_file`] | reading it |
 //! | [`distribution`] | drawing by weight |
 //!
 //! A light is chosen half by the luminance of its flux, half alike. All densities given out contain the probability of that choice.
@@ -14,6 +15,7 @@
 
 pub mod distribution;
 pub mod environment;
+pub mod environment_file;
 pub mod glow;
 pub mod lamp;
 
@@ -29,6 +31,7 @@ use crate::bsdf::lambert::sample_cosine_hemisphere;
 use crate::bsdf::luminance;
 use distribution::Discrete;
 pub use environment::{Environment, EnvironmentError, Interpolation, Layout};
+pub use environment_file::{EnvironmentFile, EnvironmentFileError};
 use glow::Glow;
 use lamp::Lamp;
 

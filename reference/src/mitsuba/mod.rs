@@ -26,8 +26,8 @@ use thiserror::Error;
 
 use crate::camera::Camera;
 use crate::emitter::{Environment, Layout};
-use coshade_image_file::{Image, ImageError, LayeredImage, Precision, write_exr};
 use crate::integrator::Settings;
+use coshade_image_file::{Image, ImageError, LayeredImage, Precision, write_exr};
 use xml::Element;
 
 /// Folder of the meshes, beside the scene file.

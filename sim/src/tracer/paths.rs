@@ -1,5 +1,7 @@
 //! The path tracer as the eye of simulated sensors.
 
+use std::sync::Arc;
+
 use coshade_reference::accel::{Ray, Sees};
 use coshade_reference::camera::CameraRay;
 use coshade_reference::integrator::{EyePath, Method, Settings, TraceScene};
@@ -29,7 +31,7 @@ impl Default for TraceSpec {
 
 /// Traces paths through a scene, without photons: caustics of small lamps hardly converge.
 pub struct PathTracer {
-    scene: TraceScene,
+    scene: Arc<TraceScene>,
     spec: TraceSpec,
     content: String,
 }
@@ -37,7 +39,12 @@ pub struct PathTracer {
 impl PathTracer {
     /// `content` stands for the scene in [`Tracer::key`].
     pub fn new(scene: TraceScene, spec: TraceSpec, content: String) -> Self {
-        Self { scene, spec, content }
+        Self { scene: Arc::new(scene), spec, content }
+    }
+
+    /// What it traces.
+    pub fn scene(&self) -> &Arc<TraceScene> {
+        &self.scene
     }
 
     fn settings(&self) -> Settings {

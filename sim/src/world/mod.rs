@@ -10,10 +10,10 @@ use std::sync::Arc;
 
 use coshade_config::{Document, Error, Problem};
 use coshade_lens::calibration::{Calibration, CalibrationError};
-use coshade_reference::emitter::{Environment, Interpolation, Layout};
+use coshade_reference::emitter::{Environment, EnvironmentFile, EnvironmentFileError};
 use coshade_reference::integrator::{TraceError, TraceScene};
 use coshade_tracker::Board;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 pub use scene::PlacedTag;
 pub use spec::{MountSpec, SensorSpec, WorldSpec};
@@ -67,13 +67,8 @@ pub enum WorldError {
         reason: String,
     },
     /// The image of the environment cannot be used.
-    #[error("environment {}: {reason}", path.display())]
-    Environment {
-        /// The file.
-        path: PathBuf,
-        /// Why not.
-        reason: String,
-    },
+    #[error("environment: {0}")]
+    Environment(#[from] EnvironmentFileError),
     /// The scene cannot be traced.
     #[error(transparent)]
     Trace(#[from] TraceError),
@@ -195,22 +190,11 @@ impl World {
     fn environment(&self) -> Result<Option<Environment>, WorldError> {
         let Some(spec) = &self.spec().environment else { return Ok(None) };
         let path = self.resolve(&spec.file);
-        let unusable = |reason: String| WorldError::Environment { path: path.clone(), reason };
-        let layered = coshade_image_file::read(&path).map_err(|error| unusable(error.to_string()))?;
-        let image = &layered.layers.first().ok_or_else(|| unusable("no image in it".into()))?.image;
-        let plane = |name: &str| {
-            let channel = image.channels().iter().find(|channel| channel.name == name);
-            channel
-                .map(|channel| channel.samples.as_slice())
-                .ok_or_else(|| unusable(format!("no channel {name}")))
-        };
-        let (r, g, b) = (plane("R")?, plane("G")?, plane("B")?);
-        let scale = spec.scale as f32;
-        let texels = r.iter().zip(g).zip(b).map(|((r, g), b)| Vec3::new(*r, *g, *b) * scale).collect();
-        let size = [image.width(), image.height()];
-        let yaw_rad = spec.yaw_deg.to_radians() as f32;
-        let environment = Environment::new(Layout::LatLong, size, texels, Interpolation::default(), yaw_rad);
-        environment.map(Some).map_err(|error| unusable(error.to_string()))
+        let file = EnvironmentFile::read(&path, spec)?;
+        if file.negative > 0 {
+            tracing::warn!("{}: {} samples below zero are taken as 0", path.display(), file.negative);
+        }
+        Ok(Some(file.environment))
     }
 
     /// The true calibration of a sensor.

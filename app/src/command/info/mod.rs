@@ -3,7 +3,7 @@
 mod board;
 mod calibration;
 mod folder;
-mod kind;
+pub mod kind;
 mod mesh;
 mod picture;
 mod recording;
