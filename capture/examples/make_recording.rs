@@ -14,7 +14,7 @@ use coshade_capture::{Frame, PixelFormat, Timestamp};
 use coshade_lens::calibration::Calibration;
 use serde_json::{Value, json};
 
-const FORMATS: [PixelFormat; 8] = [
+const FORMATS: [PixelFormat; 9] = [
     PixelFormat::Yuyv,
     PixelFormat::Uyvy,
     PixelFormat::Nv12,
@@ -22,6 +22,7 @@ const FORMATS: [PixelFormat; 8] = [
     PixelFormat::Y16,
     PixelFormat::Z16,
     PixelFormat::Rgb24,
+    PixelFormat::RgbF32,
     PixelFormat::Mjpg,
 ];
 
@@ -93,7 +94,7 @@ fn record(path: &Path) -> Result<Value, Box<dyn Error>> {
         let (translation_m, rotation_xyzw) = ([0.1, 0.2, index as f64], [0.0, 0.0, 0.0, 1.0]);
         writer.write_transform(&RecordedTransform { stamp, parent, child, translation_m, rotation_xyzw })?;
     }
-    writer.finish(&[0; 8])?;
+    writer.finish(&[0; FORMATS.len()])?;
     let lens = calibration.model.intrinsics();
     let k = [lens.fx, 0.0, lens.cx, 0.0, lens.fy, lens.cy, 0.0, 0.0, 1.0];
     Ok(json!({ "frames": expected, "transforms": 12, "session": session, "k": k }))

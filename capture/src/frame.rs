@@ -95,6 +95,18 @@ pub enum FrameError {
         /// Bytes there are.
         found_bytes: usize,
     },
+    /// A linear frame holds a value that is no number, or infinite.
+    #[error("pixel ({x}, {y}): {channel} is {value}; a RGBF32 frame holds finite values only")]
+    NotFinite {
+        /// Column.
+        x: usize,
+        /// Row.
+        y: u32,
+        /// `red`, `green` or `blue`.
+        channel: &'static str,
+        /// What is there.
+        value: f32,
+    },
     /// A frame that should be depth is of another format.
     #[error("a {0} frame is no depth image: its format must be Z16")]
     NotDepth(PixelFormat),
@@ -149,10 +161,12 @@ impl Frame {
         Self::new(format, width_px, height_px, stride_bytes, pixels)
     }
 
-    /// Whether size, stride and number of bytes fit each other: what every reader of pixels relies on.
+    /// Whether size, stride and number of bytes fit each other, and linear values are finite: what every reader of pixels
+    /// relies on.
     ///
     /// # Errors
-    /// [`FrameError::Size`], [`FrameError::OddSize`], [`FrameError::Stride`] or [`FrameError::TooShort`].
+    /// [`FrameError::Size`], [`FrameError::OddSize`], [`FrameError::Stride`], [`FrameError::TooShort`] or
+    /// [`FrameError::NotFinite`].
     pub fn check(&self) -> Result<(), FrameError> {
         let Self { format, width_px, height_px, stride_bytes, .. } = *self;
         check_size(format, width_px, height_px)?;
@@ -181,6 +195,24 @@ impl Frame {
                 found_bytes,
             });
         }
+        match format {
+            PixelFormat::RgbF32 => self.check_finite(),
+            _ => Ok(()),
+        }
+    }
+
+    fn check_finite(&self) -> Result<(), FrameError> {
+        for (y, row) in (0..self.height_px).filter_map(|y| Some((y, self.row(y)?))) {
+            let values = || row.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes));
+            // Without a way out of the loop it becomes vector code.
+            if values().fold(true, |all, value| all & value.is_finite()) {
+                continue;
+            }
+            if let Some((at, value)) = values().enumerate().find(|(_, value)| !value.is_finite()) {
+                let channel = ["red", "green", "blue"][at % 3];
+                return Err(FrameError::NotFinite { x: at / 3, y, channel, value });
+            }
+        }
         Ok(())
     }
 
@@ -191,6 +223,13 @@ impl Frame {
             return None;
         }
         self.row_at(y)
+    }
+
+    /// The linear red, green and blue of row `y`, left to right; empty below the image and for other formats than RGBF32.
+    pub fn rgb_f32_row(&self, y: u32) -> impl Iterator<Item = [f32; 3]> + '_ {
+        let row = self.row(y).filter(|_| self.format == PixelFormat::RgbF32).unwrap_or(&[]);
+        let values = row.as_chunks::<4>().0.as_chunks::<3>().0.iter();
+        values.map(|pixel| pixel.map(f32::from_le_bytes))
     }
 
     /// The interleaved `U V` bytes of chroma row `y` (half as many as image rows); `None` for other formats than NV12.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Layout of a frame's bytes, named after the V4L2 code.
+/// Layout of a frame's bytes, named after the V4L2 code; V4L2 has none for [`PixelFormat::RgbF32`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PixelFormat {
@@ -20,6 +20,12 @@ pub enum PixelFormat {
     Z16,
     /// 8 bit R'G'B', 3 bytes a pixel.
     Rgb24,
+    /// Linear RGB signal of the sensor, 32 bit floating point, little endian, 12 bytes a pixel.
+    ///
+    /// Proportional to radiance × exposure × gain × vignetting, without noise reduction, clipping or response; 1 is code
+    /// white, and values may lie above it (or below 0, of noise around black). Every value is finite. A calibration of such
+    /// frames has a linear response.
+    RgbF32,
     /// One JPEG image a frame (Motion JPEG).
     Mjpg,
 }
@@ -32,6 +38,7 @@ impl PixelFormat {
             Self::Nv12 | Self::Grey => 1,
             Self::Yuyv | Self::Uyvy | Self::Y16 | Self::Z16 => 2,
             Self::Rgb24 => 3,
+            Self::RgbF32 => 12,
         }
     }
 }
@@ -46,6 +53,7 @@ impl fmt::Display for PixelFormat {
             Self::Y16 => "Y16",
             Self::Z16 => "Z16",
             Self::Rgb24 => "RGB24",
+            Self::RgbF32 => "RGBF32",
             Self::Mjpg => "MJPG",
         })
     }

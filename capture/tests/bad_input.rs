@@ -112,16 +112,17 @@ fn damaged_lists_are_refused_or_read() {
     }
 }
 
-/// Random bytes are valid pixels of every uncompressed format; wrong numbers beside them must be refused.
+/// Bytes are valid pixels of every uncompressed format (linear ones unless all bits are set); wrong numbers beside them must be refused.
 #[test]
 fn frames_with_damaged_fields_are_refused_or_converted() {
-    const FORMATS: [PixelFormat; 7] = [
+    const FORMATS: [PixelFormat; 8] = [
         PixelFormat::Yuyv,
         PixelFormat::Uyvy,
         PixelFormat::Nv12,
         PixelFormat::Grey,
         PixelFormat::Y16,
         PixelFormat::Rgb24,
+        PixelFormat::RgbF32,
         PixelFormat::Mjpg,
     ];
     let good: Vec<u8> = [8_u32, 4, 24].iter().flat_map(|field| field.to_le_bytes()).collect();

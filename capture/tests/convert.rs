@@ -299,6 +299,27 @@ fn sixteen_bits_become_eight_by_rounding() {
 }
 
 #[test]
+fn linear_values_stay_as_numbers_and_become_srgb_to_look_at() {
+    // Light of the code 128 (0.2159), of a third, of black and white, and beyond both.
+    let light = [0.215_860_5, 1.0 / 3.0, 0.0, 1.0, 9.0, -0.5_f32];
+    let pixels: Vec<u8> = light.iter().flat_map(|light| light.to_le_bytes()).collect();
+    let frame = Frame::packed(PixelFormat::RgbF32, 2, 1, pixels).unwrap();
+    let mut numbers = vec![0.0; 6];
+    Converter::new().rgb_f32(&frame, &mut numbers).unwrap();
+    assert_eq!(numbers, light);
+    // A third: 1.055 · 3^(−1/2.4) − 0.055 = 0.6125 = 156.2 / 255.
+    let codes = [128, 156, 0, 255, 255, 0];
+    assert_eq!(rgb24(&frame, ChromaUpsampling::Linear), codes);
+    // 0.299 · 128 + 0.587 · 156 = 129.8, and 0.299 · 255 + 0.587 · 255 = 225.9.
+    assert_eq!(grey(&frame), [130, 226]);
+
+    let mut broken = frame.clone();
+    broken.pixels = [&0x7f80_0000_u32.to_le_bytes()[..], &frame.pixels[4..]].concat().into();
+    let error = Converter::new().rgb24(&broken, &mut [0; 6]).unwrap_err().to_string();
+    assert!(error.contains("pixel (0, 0): red is inf"), "{error}");
+}
+
+#[test]
 fn numbers_give_back_the_codes_bit_for_bit() {
     let mut converter = Converter::new();
     for case in &PEERS.yuv {

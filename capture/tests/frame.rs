@@ -3,7 +3,7 @@
 use coshade_capture::{DepthFrame, Frame, FrameError, PixelFormat};
 use proptest::prelude::*;
 
-const FORMATS: [PixelFormat; 8] = [
+const FORMATS: [PixelFormat; 9] = [
     PixelFormat::Yuyv,
     PixelFormat::Uyvy,
     PixelFormat::Nv12,
@@ -11,23 +11,25 @@ const FORMATS: [PixelFormat; 8] = [
     PixelFormat::Y16,
     PixelFormat::Z16,
     PixelFormat::Rgb24,
+    PixelFormat::RgbF32,
     PixelFormat::Mjpg,
 ];
 
 #[test]
 fn the_last_row_needs_no_padding_and_not_a_byte_less() {
-    // Width 4, height 2, stride 16: one full stride and one row; NV12 has a third row for chroma.
+    // Width 4, height 2, stride 48: one full stride and one row; NV12 has a third row for chroma.
     for (format, needed) in [
-        (PixelFormat::Grey, 16 + 4),
-        (PixelFormat::Yuyv, 16 + 8),
-        (PixelFormat::Uyvy, 16 + 8),
-        (PixelFormat::Y16, 16 + 8),
-        (PixelFormat::Z16, 16 + 8),
-        (PixelFormat::Rgb24, 16 + 12),
-        (PixelFormat::Nv12, 32 + 4),
+        (PixelFormat::Grey, 48 + 4),
+        (PixelFormat::Yuyv, 48 + 8),
+        (PixelFormat::Uyvy, 48 + 8),
+        (PixelFormat::Y16, 48 + 8),
+        (PixelFormat::Z16, 48 + 8),
+        (PixelFormat::Rgb24, 48 + 12),
+        (PixelFormat::RgbF32, 48 + 48),
+        (PixelFormat::Nv12, 96 + 4),
     ] {
-        assert!(Frame::new(format, 4, 2, 16, vec![0; needed]).is_ok(), "{format}");
-        let error = Frame::new(format, 4, 2, 16, vec![0; needed - 1]).unwrap_err();
+        assert!(Frame::new(format, 4, 2, 48, vec![0; needed]).is_ok(), "{format}");
+        let error = Frame::new(format, 4, 2, 48, vec![0; needed - 1]).unwrap_err();
         assert!(
             matches!(error, FrameError::TooShort { needed_bytes, .. } if needed_bytes == needed as u64),
             "{error}"
@@ -68,6 +70,34 @@ fn rows_are_cut_where_the_stride_says() {
     assert_eq!(frame.row(2), None);
     assert_eq!(frame.chroma_row(0), Some(&[5, 6][..]));
     assert_eq!(frame.chroma_row(1), None);
+}
+
+fn linear(values: &[f32]) -> Vec<u8> {
+    values.iter().flat_map(|value| value.to_le_bytes()).collect()
+}
+
+#[test]
+fn linear_values_are_read_wherever_rows_begin_and_must_be_finite() {
+    // Two rows of two pixels, a byte of padding between the rows.
+    let values = [0.0, -1e-40, 1.0, 7.5, f32::MAX, f32::MIN];
+    let pixels = [linear(&values), vec![0xff], linear(&values.map(|value| value / 2.0))].concat();
+    let frame = Frame::new(PixelFormat::RgbF32, 2, 2, 25, pixels.clone()).unwrap();
+    assert_eq!(frame.rgb_f32_row(0).collect::<Vec<_>>(), [[0.0, -1e-40, 1.0], [7.5, f32::MAX, f32::MIN]]);
+    assert_eq!(frame.rgb_f32_row(1).nth(1), Some([3.75, f32::MAX / 2.0, f32::MIN / 2.0]));
+    assert_eq!(frame.rgb_f32_row(2).count(), 0);
+
+    for (at, value, message) in [
+        (0, f32::NAN, "pixel (0, 0): red is NaN; a RGBF32 frame holds finite values only"),
+        (20, f32::NEG_INFINITY, "pixel (1, 0): blue is -inf"),
+        (25 + 16, f32::INFINITY, "pixel (1, 1): green is inf"),
+    ] {
+        let mut damaged = pixels.clone();
+        damaged[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        let error = Frame::new(PixelFormat::RgbF32, 2, 2, 25, damaged.clone()).unwrap_err();
+        assert!(error.to_string().starts_with(message), "{error}");
+    }
+    let bytes = Frame::packed(PixelFormat::Grey, 12, 1, vec![0; 12]).unwrap();
+    assert_eq!(bytes.rgb_f32_row(0).count(), 0, "bytes are no linear values");
 }
 
 #[test]

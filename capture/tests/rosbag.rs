@@ -116,6 +116,8 @@ fn image_encodings_are_mapped_or_named() {
         frames.is_empty() && errors[0].contains("32FC1") && errors[0].contains("/camera/image"),
         "{errors:?}"
     );
+    let (frames, errors) = read("32FC3", 24, &[0; 24]);
+    assert!(frames.is_empty() && errors[0].contains("nor their order"), "{errors:?}");
     let (frames, errors) = read("rgb8", 0, &[0; 6]);
     assert!(frames.is_empty() && !errors.is_empty());
 }

@@ -28,7 +28,7 @@ FOXGLOVE = {
     "foxglove.CameraCalibration": CameraCalibration,
     "foxglove.FrameTransform": FrameTransform,
 }
-ENCODINGS = {"YUYV": "yuyv", "UYVY": "uyvy", "NV12": "nv12", "GREY": "mono8", "Y16": "mono16", "Z16": "16UC1", "RGB24": "rgb8"}
+ENCODINGS = {"YUYV": "yuyv", "UYVY": "uyvy", "NV12": "nv12", "GREY": "mono8", "Y16": "mono16", "Z16": "16UC1", "RGB24": "rgb8", "RGBF32": "32FC3"}
 
 
 def same_layout(ours, theirs):

@@ -14,8 +14,13 @@
 //! **JPEG** is decoded by the crate `zune-jpeg`, whose chroma sits between the pixels both ways as JFIF has it, and is
 //! upsampled linearly (the "fancy upsampling" of libjpeg). Its frames are BT.601, full range, whatever
 //! [`Frame::color`] says.
+//!
+//! **Linear frames** (RGBF32) have no codes. [`Converter::rgb_f32`] gives their values as they are, which are the codes of
+//! a linear response; [`Converter::rgb24`] and [`Converter::grey`] give a picture to look at and to find tags in, clipped
+//! and encoded as sRGB.
 
 pub mod jpeg;
+mod linear;
 mod yuv;
 
 use crate::frame::{Frame, FrameError};
@@ -75,7 +80,8 @@ impl Converter {
 
     /// 8 bit R′G′B′, row by row without padding: `3 · width · height` bytes.
     ///
-    /// Formats of one channel give three equal ones; their 16 bits are divided by 257 and rounded.
+    /// Formats of one channel give three equal ones; their 16 bits are divided by 257 and rounded. Linear values are clipped
+    /// to 0…1, encoded as sRGB and rounded.
     ///
     /// # Errors
     /// [`ConvertError`]; the output's content is then unspecified.
@@ -94,13 +100,15 @@ impl Converter {
             PixelFormat::Y16 | PixelFormat::Z16 => each_row(frame, out, row_len, |row, out| {
                 spread(codes_16(row).map(high_8), out);
             }),
+            PixelFormat::RgbF32 => each_linear(frame, out, |rgb| rgb.map(linear::code)),
         }
         Ok(())
     }
 
     /// R′G′B′ from 0 to 1, row by row without padding: `3 · width · height` values.
     ///
-    /// The codes of [`rgb24`](Self::rgb24) divided by 255; for 16 bit formats the codes divided by 65535.
+    /// The codes of [`rgb24`](Self::rgb24) divided by 255; for 16 bit formats the codes divided by 65535; linear values as
+    /// they are, neither clipped nor encoded.
     ///
     /// # Errors
     /// As [`rgb24`](Self::rgb24).
@@ -111,6 +119,10 @@ impl Converter {
             each_row(frame, out, row_len, |row, out| {
                 spread(codes_16(row).map(|code| f32::from(code) / 65535.0), out);
             });
+            return Ok(());
+        }
+        if frame.format == PixelFormat::RgbF32 {
+            each_linear(frame, out, |rgb| rgb);
             return Ok(());
         }
         let mut rgb = std::mem::take(&mut self.rgb);
@@ -126,7 +138,7 @@ impl Converter {
     /// 8 bit luminance for detectors, row by row without padding: `width · height` bytes.
     ///
     /// The Y codes themselves where the format has them (in the range they were coded in; MJPG as JPEG's Y), else
-    /// Y′ = 0.299 R′ + 0.587 G′ + 0.114 B′, rounded. For GREY and NV12 the same bytes are in the frame already: its
+    /// Y′ = 0.299 R′ + 0.587 G′ + 0.114 B′ of the codes of [`rgb24`](Self::rgb24), rounded. For GREY and NV12 the same bytes are in the frame already: its
     /// [`row`](Frame::row)s can be read without a copy.
     ///
     /// # Errors
@@ -147,6 +159,7 @@ impl Converter {
             PixelFormat::Rgb24 => each_row(frame, out, row_len, |row, out| {
                 out.iter_mut().zip(row.as_chunks::<3>().0).for_each(|(out, rgb)| *out = luma_601(*rgb));
             }),
+            PixelFormat::RgbF32 => each_linear(frame, out, |rgb| [luma_601(rgb.map(linear::code))]),
         }
         Ok(())
     }
@@ -196,6 +209,14 @@ fn each_row<T>(frame: &Frame, out: &mut [T], row_len: usize, mut convert: impl F
         if let Some(row) = frame.row(y) {
             convert(row, out);
         }
+    }
+}
+
+/// Writes what `convert` makes of each pixel of a linear frame.
+fn each_linear<T, const N: usize>(frame: &Frame, out: &mut [T], convert: impl Fn([f32; 3]) -> [T; N]) {
+    for (y, out) in (0..frame.height_px).zip(out.chunks_exact_mut(frame.width_px as usize * N)) {
+        let pixels = out.as_chunks_mut::<N>().0.iter_mut();
+        pixels.zip(frame.rgb_f32_row(y)).for_each(|(out, rgb)| *out = convert(rgb));
     }
 }
 

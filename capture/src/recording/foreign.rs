@@ -120,6 +120,11 @@ fn layout(encoding: &str, stream: ForeignStream) -> Result<(PixelFormat, Change)
         "bgr8" | "8UC3" => (PixelFormat::Rgb24, Change::SwapRedBlue),
         "rgba8" => (PixelFormat::Rgb24, Change::DropAlpha { swap: false }),
         "bgra8" | "8UC4" => (PixelFormat::Rgb24, Change::DropAlpha { swap: true }),
+        "32FC3" => {
+            return Err("images of encoding \"32FC3\" are supported only if coshade recorded them: the encoding does not \
+                 say whether its three numbers are colours, nor their order"
+                .into());
+        }
         other => {
             return Err(format!(
                 "images of encoding {other:?} are not supported; supported are yuyv, uyvy, nv12, mono8, mono16, \

@@ -50,7 +50,7 @@ pub(crate) struct FrameInfo {
     pub(crate) dropped_before: u64,
 }
 
-const FORMATS: [(PixelFormat, &str); 8] = [
+const FORMATS: [(PixelFormat, &str); 9] = [
     (PixelFormat::Yuyv, "yuyv"),
     (PixelFormat::Uyvy, "uyvy"),
     (PixelFormat::Nv12, "nv12"),
@@ -58,6 +58,7 @@ const FORMATS: [(PixelFormat, &str); 8] = [
     (PixelFormat::Y16, "y16"),
     (PixelFormat::Z16, "z16"),
     (PixelFormat::Rgb24, "rgb24"),
+    (PixelFormat::RgbF32, "rgbf32"),
     (PixelFormat::Mjpg, "mjpg"),
 ];
 const MATRICES: [(YuvMatrix, &str); 2] = [(YuvMatrix::Bt601, "bt601"), (YuvMatrix::Bt709, "bt709")];

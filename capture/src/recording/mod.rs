@@ -4,7 +4,7 @@
 //!
 //! | topic | schema | what |
 //! | --- | --- | --- |
-//! | `/NAME/image` | `foxglove.CompressedImage` or `foxglove.RawImage` | the bytes as they came from the camera: MJPG not decoded, strides kept, depth as `16UC1` |
+//! | `/NAME/image` | `foxglove.CompressedImage` or `foxglove.RawImage` | the bytes as they came from the camera: MJPG not decoded, strides kept, depth as `16UC1`, linear RGB as `32FC3` (which the viewer cannot show) |
 //! | `/NAME/frame_info` | `coshade.FrameInfo` | all else that is known of the frame; written before the image, with the same log time and sequence |
 //! | `/NAME/calibration` | `foxglove.CameraCalibration` | the lens, for viewers |
 //! | `/tf` | `foxglove.FrameTransform` | poses |

@@ -11,7 +11,7 @@ use coshade_capture::recording::{
 };
 use coshade_capture::{ColorEncoding, Frame, PixelFormat, Timestamp, YuvMatrix, YuvRange};
 
-pub const FORMATS: [PixelFormat; 8] = [
+pub const FORMATS: [PixelFormat; 9] = [
     PixelFormat::Yuyv,
     PixelFormat::Uyvy,
     PixelFormat::Nv12,
@@ -19,6 +19,7 @@ pub const FORMATS: [PixelFormat; 8] = [
     PixelFormat::Y16,
     PixelFormat::Z16,
     PixelFormat::Rgb24,
+    PixelFormat::RgbF32,
     PixelFormat::Mjpg,
 ];
 
@@ -52,7 +53,12 @@ pub fn frame(format: PixelFormat, index: u64) -> Frame {
     let stride = if format == PixelFormat::Mjpg { 0 } else { width * format.bytes_per_row_pixel() + padding };
     let rows = if format == PixelFormat::Nv12 { height * 3 / 2 } else { height };
     let len = if stride == 0 { 200 + random.below(200) } else { u64::from(stride * rows) };
-    let pixels = random.bytes(len as usize);
+    let mut pixels = random.bytes(len as usize);
+    if format == PixelFormat::RgbF32 {
+        // Any finite numbers: the exponent's lowest bit is 0, so it is not the one of infinities.
+        let rows = pixels.chunks_exact_mut(stride as usize).flat_map(|row| row.as_chunks_mut::<4>().0);
+        rows.for_each(|number| number[2] &= 0x7f);
+    }
     let mut frame = Frame::new(format, width, height, stride, pixels).unwrap();
     frame.captured = Timestamp::from_ns(1_000_000_000 + index * 10_000_000 + random.below(1_000_000));
     frame.arrived = frame.captured + Duration::from_nanos(random.below(5_000_000));

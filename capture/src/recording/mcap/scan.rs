@@ -34,9 +34,13 @@ pub(super) fn scan(file: &mut McapFile) -> Result<(), RecordingError> {
                 walk.learn(file)?;
                 return Ok(());
             }
-            Step::Lost(what) => at = recover(file, at, what)?,
+            Step::Lost(what) => {
+                walk.distrust_index();
+                at = recover(file, at, what)?;
+            }
         }
     }
+    walk.distrust_index();
     walk.learn(file)?;
     let what = "the file ends here: the recording was not finished".to_owned();
     if file.damage.last().is_none_or(|damage| damage.offset + damage.lost_bytes < at) {
@@ -100,6 +104,11 @@ impl Walk {
         }
         file.other_record(at, end - at)?;
         Ok(Step::To(end))
+    }
+
+    /// The latest chunk may have more channels than the index records that were read say.
+    fn distrust_index(&mut self) {
+        self.indexed_channels.clear();
     }
 
     /// Channels are defined within chunks: loads the latest chunk if it may define one.
