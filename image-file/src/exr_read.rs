@@ -9,32 +9,35 @@ use std::panic::catch_unwind;
 use std::path::Path;
 
 use exr::meta::MetaData;
-use exr::prelude::{AnyChannel, FlatImage, FlatSamples, ReadChannels, ReadLayers, Vec2};
+use exr::meta::attribute::IntegerBounds;
+use exr::prelude::{FlatImage, FlatSamples, ReadChannels, ReadLayers, Vec2};
 
 use super::image::{Channel, Image, LayeredImage, Window};
-use super::{ImageError, ReadLimits, exr_dwa};
+use super::{ImageError, LayerOutline, ReadLimits, exr_dwa};
 
 const PART: &str = "EXR";
 
 pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<LayeredImage, ImageError> {
-    check_headers(path, bytes, limits)?;
+    headers(path, bytes, limits)?;
 
     let file = decode(path, bytes)?;
     let display = file.attributes.display_window;
     let parts = file.layer_data.len();
     let mut result = LayeredImage::default();
     for part in file.layer_data {
-        let Vec2(x, y) = part.attributes.layer_position;
-        let window = Window {
-            data_origin_px: [x, y],
-            display_origin_px: [display.position.0, display.position.1],
-            display_size_px: [display.size.0, display.size.1],
-        };
+        let window = window(part.attributes.layer_position, display);
         let name = part.attributes.layer_name.map(|name| name.to_string()).unwrap_or_default();
         let own_name = if parts > 1 { name.as_str() } else { "" };
-        for (prefix, mut channels) in group_by_prefix(part.channel_data.list.into_vec(), &mut result.notes) {
-            let layer = layer_name(&result, own_name, &prefix);
-            Image::sort_channels(&mut channels);
+        let channels = part.channel_data.list.into_iter().map(|channel| {
+            let name = channel.name.to_string();
+            let samples = floats(channel.sample_data, &name, &mut result.notes);
+            (name, samples)
+        });
+        for (prefix, channels) in group_by_prefix(channels.collect()) {
+            let layer = layer_name(|name| result.layer(name).is_some(), own_name, &prefix);
+            let channel = |(name, samples)| Channel { name, samples };
+            let mut channels: Vec<Channel> = channels.into_iter().map(channel).collect();
+            Image::sort_channels(&mut channels, |channel| &channel.name);
             let image = Image::new(part.size.0, part.size.1, channels)
                 .map_err(|error| ImageError::decode(path, PART, format!("layer {layer:?}: {error}")))?;
             let pushed = result.push(&layer, image.with_window(window));
@@ -43,6 +46,46 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Lay
     }
     result.note_non_finite();
     Ok(result)
+}
+
+/// The layers that [`read`] would give.
+pub(super) fn outline(
+    path: &Path,
+    bytes: &[u8],
+    limits: &ReadLimits,
+) -> Result<Vec<LayerOutline>, ImageError> {
+    let meta = headers(path, bytes, limits)?;
+    let parts = meta.headers.len();
+    let mut layers: Vec<LayerOutline> = Vec::new();
+    for part in meta.headers {
+        let name = part.own_attributes.layer_name.map(|name| name.to_string()).unwrap_or_default();
+        let own_name = if parts > 1 { name.as_str() } else { "" };
+        let channels = part.channels.list.into_iter().map(|channel| (channel.name.to_string(), ()));
+        for (prefix, channels) in group_by_prefix(channels.collect()) {
+            let is_taken = |name: &str| layers.iter().any(|layer| layer.name == name);
+            let mut channels: Vec<String> = channels.into_iter().map(|(name, ())| name).collect();
+            Image::sort_channels(&mut channels, |name| name);
+            layers.push(LayerOutline {
+                name: layer_name(is_taken, own_name, &prefix),
+                width: part.layer_size.0,
+                height: part.layer_size.1,
+                channels,
+                window: Some(window(
+                    part.own_attributes.layer_position,
+                    part.shared_attributes.display_window,
+                )),
+            });
+        }
+    }
+    Ok(layers)
+}
+
+fn window(Vec2(x, y): Vec2<i32>, display: IntegerBounds) -> Window {
+    Window {
+        data_origin_px: [x, y],
+        display_origin_px: [display.position.0, display.position.1],
+        display_size_px: [display.size.0, display.size.1],
+    }
 }
 
 /// The crate's decoder, with its panics made errors: exr 1.74 overflows on broken B44 blocks when built with checks.
@@ -66,7 +109,7 @@ fn decode(path: &Path, bytes: &[u8]) -> Result<FlatImage, ImageError> {
 }
 
 /// Refuses what cannot be read, and sizes beyond the limits, before any pixel is allocated.
-fn check_headers(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<(), ImageError> {
+fn headers(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<MetaData, ImageError> {
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false)
         .map_err(|error| ImageError::decode(path, PART, error))?;
     let mut total_bytes = 0u64;
@@ -110,20 +153,15 @@ fn check_headers(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<(), I
             });
         }
     }
-    Ok(())
+    Ok(meta)
 }
 
 /// Splits `real.R` into layer and channel; layers in the order of their first channel.
-fn group_by_prefix(
-    channels: Vec<AnyChannel<FlatSamples>>,
-    notes: &mut Vec<String>,
-) -> Vec<(String, Vec<Channel>)> {
-    let mut groups: Vec<(String, Vec<Channel>)> = Vec::new();
-    for channel in channels {
-        let full_name = channel.name.to_string();
+fn group_by_prefix<T>(channels: Vec<(String, T)>) -> Vec<(String, Vec<(String, T)>)> {
+    let mut groups: Vec<(String, Vec<(String, T)>)> = Vec::new();
+    for (full_name, content) in channels {
         let (prefix, name) = full_name.rsplit_once('.').unwrap_or(("", &full_name));
-        let samples = floats(channel.sample_data, &full_name, notes);
-        let channel = Channel { name: name.into(), samples };
+        let channel = (name.to_owned(), content);
         match groups.iter_mut().find(|(existing, _)| existing == prefix) {
             Some((_, members)) => members.push(channel),
             None => groups.push((prefix.into(), vec![channel])),
@@ -148,9 +186,9 @@ fn floats(samples: FlatSamples, name: &str, notes: &mut Vec<String>) -> Vec<f32>
 }
 
 /// The prefix, or the part's name without one; both if another part has that name already.
-fn layer_name(taken: &LayeredImage, part: &str, prefix: &str) -> String {
+fn layer_name(is_taken: impl Fn(&str) -> bool, part: &str, prefix: &str) -> String {
     let short = if prefix.is_empty() { part } else { prefix };
-    if taken.layer(short).is_some() && !part.is_empty() && short != part {
+    if is_taken(short) && !part.is_empty() && short != part {
         format!("{part}.{prefix}")
     } else {
         short.into()

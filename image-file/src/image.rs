@@ -183,10 +183,10 @@ impl Image {
         census
     }
 
-    /// The image with channels in the customary order: `R G B A`, then the others by name.
-    pub(crate) fn sort_channels(channels: &mut [Channel]) {
+    /// Sorts channels into the customary order: `R G B A`, then the others by name.
+    pub(crate) fn sort_channels<T>(channels: &mut [T], name: impl Fn(&T) -> &str) {
         let rank = |name: &str| "RGBA".find(name).filter(|_| name.len() == 1).unwrap_or(4);
-        channels.sort_by(|a, b| rank(&a.name).cmp(&rank(&b.name)).then_with(|| a.name.cmp(&b.name)));
+        channels.sort_by(|a, b| (rank(name(a)), name(a)).cmp(&(rank(name(b)), name(b))));
     }
 }
 

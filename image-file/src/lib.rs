@@ -4,13 +4,14 @@
 //! values and are decoded with the exact piecewise curve of IEC 61966-2-1 ([`srgb`]), whatever colour profile they
 //! name (a note says so if they name one). Alpha is linear in every format.
 //!
-//! [`read`] looks at the first bytes, not at the extension. [`ReadLimits`] bounds what a header may ask for.
+//! [`read`] looks at the first bytes, not at the extension; [`outline`](outline()) at the header alone. [`ReadLimits`] bounds what a header may ask for.
 
 mod error;
 mod exr_dwa;
 mod exr_read;
 mod exr_write;
 mod image;
+mod outline;
 mod png_jpeg;
 mod radiance;
 mod spec;
@@ -23,6 +24,7 @@ use std::path::Path;
 pub use self::image::{Channel, ColourKind, Image, Layer, LayeredImage, SampleCensus, Window};
 pub use error::ImageError;
 pub use exr_write::{Precision, write_exr};
+pub use outline::{LayerOutline, outline};
 pub use png_jpeg::{BitDepth, write_png, write_png_rgb8};
 pub use spec::{ImageSpec, read_spec};
 

@@ -7,16 +7,14 @@
 use std::path::Path;
 
 use super::image::{Channel, Image, LayeredImage};
-use super::{ImageError, ReadLimits};
+use super::{ImageError, LayerOutline, ReadLimits};
 
 const PART: &str = "Radiance HDR";
 
 pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<LayeredImage, ImageError> {
     let mut reader = Reader { path, rest: bytes };
-    let notes = reader.header()?;
-    let raster = reader.resolution()?;
+    let (raster, notes) = reader.start(limits)?;
     let (width, height) = (raster.width, raster.height);
-    limits.check(path, width, height, 3)?;
 
     let mut planes: [Vec<f32>; 3] = Default::default();
     for plane in &mut planes {
@@ -41,6 +39,13 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Lay
     let mut file = LayeredImage::single(Image::new(width, height, channels)?);
     file.notes = notes;
     Ok(file)
+}
+
+/// The one layer that [`read`] would give.
+pub(super) fn outline(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<LayerOutline, ImageError> {
+    let (Raster { width, height, .. }, _) = Reader { path, rest: bytes }.start(limits)?;
+    let channels = ["R", "G", "B"].map(str::to_owned).into();
+    Ok(LayerOutline { name: String::new(), width, height, channels, window: None })
 }
 
 /// 2^(e − 136), and 0 for e = 0. Subnormal below e = 10, but exact: 2^-135 is a multiple of the least `f32`.
@@ -73,6 +78,14 @@ impl<'a> Reader<'a> {
         let (line, rest) = self.rest.split_at(end);
         self.rest = rest.get(1..).unwrap_or_default();
         Ok(String::from_utf8_lossy(line).trim_end_matches('\r').to_owned())
+    }
+
+    /// Reads all that comes before the pixels, and checks the size; with what the user should know.
+    fn start(&mut self, limits: &ReadLimits) -> Result<(Raster, Vec<String>), ImageError> {
+        let notes = self.header()?;
+        let raster = self.resolution()?;
+        limits.check(self.path, raster.width, raster.height, 3)?;
+        Ok((raster, notes))
     }
 
     /// Reads up to the empty line and returns what the user should know.

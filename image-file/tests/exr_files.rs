@@ -4,8 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use coshade_image_file::{
-    Channel, Image, ImageError, ImageSpec, LayeredImage, Precision, ReadLimits, read, read_bytes,
-    read_with_limits, write_exr,
+    Channel, Image, ImageError, ImageSpec, Layer, LayerOutline, LayeredImage, Precision, ReadLimits, outline,
+    read, read_bytes, read_with_limits, write_exr,
 };
 use glam::Vec3;
 
@@ -38,6 +38,33 @@ fn every_kind_of_file_reads_as_openexr_reads_it() {
             assert_eq!(ours.as_slice(), theirs, "{name} {full_name}");
         }
     }
+}
+
+#[test]
+fn an_outline_is_what_reading_gives_and_needs_the_header_only() {
+    let files = std::fs::read_dir(folder()).unwrap().map(|entry| entry.unwrap().path());
+    let exr: Vec<PathBuf> = files.filter(|path| path.extension().is_some_and(|e| e == "exr")).collect();
+    assert_eq!(exr.len(), 14);
+    for path in exr {
+        let bytes = std::fs::read(&path).unwrap();
+        let limits = ReadLimits::default();
+        let outlined = |Layer { name, image }: &Layer| LayerOutline {
+            name: name.clone(),
+            width: image.width(),
+            height: image.height(),
+            channels: image.channel_names().into_iter().map(str::to_owned).collect(),
+            window: image.window(),
+        };
+        let expected: Vec<LayerOutline> = read(&path).unwrap().layers.iter().map(outlined).collect();
+        assert_eq!(outline(&path, &bytes, &limits).unwrap(), expected, "{}", path.display());
+        // 37 x 23 samples of 2 bytes take more than the last 40 bytes, however packed.
+        assert_eq!(outline(&path, &bytes[..bytes.len() - 40], &limits).unwrap(), expected);
+        assert!(outline(&path, &bytes[..100], &limits).is_err());
+    }
+    let hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 7 +X 5\n";
+    let outlined = outline(Path::new("x.hdr"), hdr, &ReadLimits::default()).unwrap().remove(0);
+    assert_eq!((outlined.width, outlined.height, outlined.channels.concat().as_str()), (5, 7, "RGB"));
+    assert!(outline(Path::new("x.png"), b"\x89PNG", &ReadLimits::default()).is_err());
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use coshade_image_file::{BitDepth, Channel, Image, ReadLimits, read_bytes, write_png};
+use coshade_image_file::{BitDepth, Channel, Image, ReadLimits, outline, read_bytes, write_png};
 use coshade_testdata::mutate::mutations;
 
 static LIVE: AtomicUsize = AtomicUsize::new(0);
@@ -125,11 +125,14 @@ fn mutated_files_are_read_or_refused() {
             PEAK.store(before, Ordering::Relaxed);
             #[allow(clippy::disallowed_methods, reason = "measures real time; there is nothing to replay")]
             let start = Instant::now();
+            let outlined = outline(&path, &bytes, &LIMITS);
             let result = read_bytes(&path, &bytes, &LIMITS);
             slowest = slowest.max(start.elapsed());
             let peak = PEAK.load(Ordering::Relaxed) - before;
             highest = highest.max(peak);
             assert!(peak <= PEAK_BYTES, "{name}: {peak} bytes");
+            let is_linear = ["exr", "hdr"].contains(&format);
+            assert!(outlined.is_ok() || result.is_err() || !is_linear, "{name}: {outlined:?}");
             if let Err(error) = result {
                 refused += 1;
                 let message = error.to_string();
