@@ -293,3 +293,40 @@ fn a_described_world_becomes_a_recording_and_a_camera() {
     let live = coshade(folder.path(), live).success().json();
     assert_eq!(live["streams"][0]["written"], simulated["streams"][0]["written"]);
 }
+
+#[test]
+fn the_truth_of_a_frame_of_a_world_is_traced_and_shown_on_a_sheet() {
+    let folder = tempfile::tempdir().unwrap();
+    let world = workspace("sim/tests/data/desk.toml");
+    let world = world.to_str().unwrap();
+    let run = |args: &str| coshade(folder.path(), args);
+
+    let traced =
+        run(&format!("reference {world}#camera --frame 3 --samples 2 -o truth.exr --json")).success();
+    assert_eq!(traced.json()["samples_min"], 2);
+    let pictured = run("info truth.exr --json").success().json().to_string();
+    assert!(pictured.contains("difference") && pictured.contains("coverage"), "{pictured}");
+    run(&format!("reference {world}#camera --samples 2 -o first.exr")).success();
+    let moved = run("compare truth.exr#real first.exr#real --json").success().json();
+    assert_eq!(moved["identical"], false, "the rig moves between frames 0 and 3");
+
+    run(&format!("simulate {world} --no-cache -o r.mcap")).success();
+    run("sheet truth.exr#mixed truth.exr#difference truth.exr#depth_z_m r.mcap --columns 3 --tile-px 100 -o s.png")
+        .success();
+    let sheet = image::open(folder.path().join("s.png")).unwrap();
+    // Three tiles of 100 px in a row, 12 px between them; a row of pictures and one for each of three streams.
+    assert_eq!(sheet.width(), 3 * 100 + 4 * 12);
+    assert_eq!(sheet.height(), (60 + 60 + 48 + 64) + 4 * (22 + 12) + 12);
+
+    for (args, expected) in [
+        (format!("reference {world} -o x.exr"), "#camera"),
+        (format!("reference {world}#nose -o x.exr"), "no sensor `nose`; there are camera, depth, fisheye"),
+        (format!("reference {world}#camera --frame 5 -o x.exr"), "camera exposes 5 frames"),
+        ("sheet truth.exr -o s.png".to_owned(), "name a layer"),
+        ("sheet r.mcap#nose -o s.png".to_owned(), "nose"),
+        ("sheet truth.exr#mixed -o s.jpg".to_owned(), ".png"),
+    ] {
+        let refused = run(&args).failure(2);
+        assert!(refused.stderr.contains(expected), "{args}: {}", refused.stderr);
+    }
+}

@@ -9,6 +9,7 @@ pub mod print;
 pub mod record;
 pub mod reference;
 pub mod replay;
+pub mod sheet;
 pub mod simulate;
 pub mod traced;
 

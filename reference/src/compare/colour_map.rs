@@ -6,7 +6,7 @@ use coshade_image_file::srgb;
 ///
 /// The ends are those of K. Moreland, "Diverging Color Maps for Scientific Visualization", 2009: of equal lightness, so
 /// that neither sign looks larger. Input is clamped to [−1, 1].
-pub(super) fn diverging(value: f64) -> [u8; 3] {
+pub fn diverging(value: f64) -> [u8; 3] {
     const GREY_LIGHTNESS: f64 = 88.0;
     // Moreland's Msh ends: magnitude 80, saturation angle 1.08.
     let (end_lightness, end_chroma) = (80.0 * 1.08f64.cos(), 80.0 * 1.08f64.sin());
@@ -35,7 +35,7 @@ fn srgb_from_lab([lightness, a, b]: [f64; 3]) -> [u8; 3] {
 
 /// The magma map of matplotlib, which FLIP pictures use, as polynomials of degree 6 (M. Zucker): black for 0, light
 /// yellow for 1. Input is clamped to [0, 1].
-pub(super) fn magma(value: f64) -> [u8; 3] {
+pub fn magma(value: f64) -> [u8; 3] {
     const COEFFICIENTS: [[f64; 7]; 3] = [
         [
             -0.002136485053939582,

@@ -9,7 +9,7 @@
 //! A pixel that is NaN or infinite in a compared channel of either image is counted and left out of every mean; SSIM and
 //! FLIP, which look at neighbourhoods, see it black in both images.
 
-mod colour_map;
+pub mod colour_map;
 mod coverage;
 mod display;
 mod error;

@@ -72,6 +72,6 @@ fn without_images(folder: &Path) -> String {
     if known.len() > NAMED {
         names.push(format!("and {} more", known.len() - NAMED));
     }
-    let none = "no images (PNG, JPEG, PGM, PPM) here or one folder below";
+    let none = "no images (PNG, JPEG, PGM, PPM, EXR, HDR) here or one folder below";
     if names.is_empty() { none.to_owned() } else { format!("{none}; look at one of {}", names.join(", ")) }
 }
