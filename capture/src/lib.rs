@@ -23,7 +23,7 @@ pub use control::{Control, ControlInfo, ControlReport, ControlValue};
 pub use convert::{ChromaUpsampling, ConvertError, Converter};
 pub use frame::{DepthFrame, Frame, FrameError};
 pub use latest::{LatestError, LatestReceiver, LatestSender, latest};
-pub use pixel_format::{ColorEncoding, PixelFormat, YuvMatrix, YuvRange};
+pub use pixel_format::{ColorEncoding, PixelFormat, ResponseMismatch, YuvMatrix, YuvRange};
 pub use pool::{FramePool, PixelBuffer, PixelBufferMut};
 pub use registry::{SourceRegistry, open};
 

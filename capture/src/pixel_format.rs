@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use coshade_lens::calibration::Response;
+
 /// Layout of a frame's bytes, named after the V4L2 code; V4L2 has none for [`PixelFormat::RgbF32`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -39,6 +41,37 @@ impl PixelFormat {
             Self::Yuyv | Self::Uyvy | Self::Y16 | Self::Z16 => 2,
             Self::Rgb24 => 3,
             Self::RgbF32 => 12,
+        }
+    }
+}
+
+/// A calibration that cannot be the one of linear frames.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{format} frames hold linear light, but the calibration's response is `{response}`: use a calibration with \
+     response = {{ kind = \"linear\" }}"
+)]
+pub struct ResponseMismatch {
+    /// Layout of the frames.
+    pub format: PixelFormat,
+    /// [`Response::kind`] of the calibration.
+    pub response: &'static str,
+}
+
+impl PixelFormat {
+    /// Whether a calibration with this response can be the one of such frames: linear ones have a linear response.
+    ///
+    /// # Errors
+    /// [`ResponseMismatch`] names both.
+    pub fn check_response(self, response: &Response) -> Result<(), ResponseMismatch> {
+        let is_linear = match response {
+            Response::Linear => true,
+            Response::Gamma { gamma } => *gamma == 1.0,
+            Response::Srgb | Response::Rec709 | Response::Table(_) => false,
+        };
+        match self {
+            Self::RgbF32 if !is_linear => Err(ResponseMismatch { format: self, response: response.kind() }),
+            _ => Ok(()),
         }
     }
 }

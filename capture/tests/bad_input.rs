@@ -52,6 +52,13 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         ("jpg", encode(&color, ImageFormat::Jpeg)),
         ("pgm", [b"P5 24 18 65535\n", depth.as_bytes()].concat()),
         ("ppm", [b"P6 24 18 255\n", color.as_bytes()].concat()),
+        ("exr", include_bytes!("../../image-file/tests/data/exr/zip.exr").to_vec()),
+        ("exr", include_bytes!("../../image-file/tests/data/exr/none.exr").to_vec()),
+        (
+            "hdr",
+            [&b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 18 +X 6\n"[..], &[90, 60, 30, 128].repeat(6 * 18)]
+                .concat(),
+        ),
         ("pgm", format!("P2\n# text\n24 18\n255\n{text}").into_bytes()),
     ]
 }

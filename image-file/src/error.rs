@@ -81,6 +81,23 @@ pub enum ImageError {
 }
 
 impl ImageError {
+    /// The message without the file's name in front, for callers that name the file themselves.
+    pub fn reason(&self) -> String {
+        let message = self.to_string();
+        let path = match self {
+            Self::Open { path, .. }
+            | Self::UnknownFormat { path, .. }
+            | Self::Decode { path, .. }
+            | Self::Unsupported { path, .. }
+            | Self::TooLarge { path, .. }
+            | Self::Layer { path, .. }
+            | Self::Write { path, .. } => path,
+            Self::Shape(_) => return message,
+        };
+        let reason = message.strip_prefix(&format!("{}: ", path.display())).map(str::to_owned);
+        reason.unwrap_or(message)
+    }
+
     pub(crate) fn decode(path: &Path, part: &'static str, reason: impl ToString) -> Self {
         Self::Decode { path: path.into(), part, reason: reason.to_string() }
     }

@@ -78,6 +78,17 @@ const REC709_ALPHA: f64 = 1.099_296_826_809_44;
 const REC709_BETA: f64 = 0.018_053_968_510_807;
 
 impl Response {
+    /// What a calibration file calls it.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Srgb => "srgb",
+            Self::Rec709 => "rec709",
+            Self::Gamma { .. } => "gamma",
+            Self::Linear => "linear",
+            Self::Table(_) => "table",
+        }
+    }
+
     /// The linear light, in units of code white, that a code (0 to 1) stands for.
     pub fn inverse(&self, channel: Channel, code: f64) -> f64 {
         match self {

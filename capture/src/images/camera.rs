@@ -55,7 +55,7 @@ impl ImagesCamera {
             Layout::Files => (at_rate(files::list(&options.path)?, fps), Some(fps)),
             Layout::Tum => (tum_files(options)?, None),
         };
-        let probed = probe_all(&files, target)?;
+        let probed = probe_all(&files, target, options.layer.as_deref())?;
         let format = target.format(probed.format)?;
         let stream = StreamInfo {
             format,
@@ -70,7 +70,7 @@ impl ImagesCamera {
             name: name.into(),
             stream,
             files,
-            reader: Reader::new(target),
+            reader: Reader::new(target, options.layer.clone()),
             pace: options.pace,
             repeat: options.repeat,
             round,
@@ -228,11 +228,11 @@ fn tum_files(options: &ImagesOptions) -> Result<Vec<TumFile>, String> {
 }
 
 /// The common size and format of all readable files.
-fn probe_all(files: &[TumFile], target: Target) -> Result<Probe, String> {
+fn probe_all(files: &[TumFile], target: Target, layer: Option<&str>) -> Result<Probe, String> {
     let mut first: Option<(&TumFile, Probe)> = None;
     let mut unreadable = None;
     for file in files {
-        let probed = match probe(&file.path) {
+        let probed = match probe(&file.path, layer) {
             Ok(probed) => probed,
             Err(reason) => {
                 unreadable.get_or_insert_with(|| format!("{}: {reason}", file.path.display()));

@@ -108,7 +108,7 @@ pub enum DescribeError {
         error: std::io::Error,
     },
     /// There is nothing to describe.
-    #[error("{}: no images (PNG, JPEG, PGM, PPM) here or one folder below", folder.display())]
+    #[error("{}: no images (PNG, JPEG, PGM, PPM, EXR, HDR) here or one folder below", folder.display())]
     NoImages {
         /// The folder.
         folder: PathBuf,
@@ -312,7 +312,7 @@ fn common_probe(files: &[PathBuf], problems: &mut Vec<String>) -> Option<Probe> 
     let mut first: Option<Probe> = None;
     let mut found = Vec::new();
     for path in files {
-        match (probe(path), first) {
+        match (probe(path, None), first) {
             (Err(reason), _) => found.push(format!("{}: {reason}", path.display())),
             (Ok(probed), None) => first = Some(probed),
             (Ok(probed), Some(expected)) if probed != expected => found.push(format!(
@@ -353,7 +353,7 @@ impl Statistics {
         let mut counts = vec![0_u64; 1 << 16];
         let (mut frames_read, mut problems) = (0, Vec::new());
         // Counts as they are: the unit comes in later.
-        let mut reader = Reader::new(Target::Depth { unit_m: 1.0, invalid: None });
+        let mut reader = Reader::new(Target::Depth { unit_m: 1.0, invalid: None }, None);
         let wanted = files.len().min(SAMPLED_DEPTH_FRAMES);
         for path in (0..wanted).filter_map(|n| files.get(n * files.len() / wanted)) {
             match reader.read(path) {

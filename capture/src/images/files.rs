@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::natural;
 
-const EXTENSIONS: [&str; 6] = ["png", "jpg", "jpeg", "pgm", "ppm", "pnm"];
+const EXTENSIONS: [&str; 8] = ["png", "jpg", "jpeg", "pgm", "ppm", "pnm", "exr", "hdr"];
 
 /// Whether the name ends like that of an image this crate reads.
 pub(super) fn is_image(path: &Path) -> bool {

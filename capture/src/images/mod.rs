@@ -1,9 +1,12 @@
 //! Image files as a camera: `images:PATH?option=value&…`.
 //!
 //! PATH is a file, a folder or a glob pattern; files are taken in natural order (`2.png` before `10.png`). PNG (8 and 16
-//! bit), JPEG, PGM and PPM are recognised by content. JPEG files become MJPG frames, undecoded; 16 bit grey becomes Y16,
+//! bit), JPEG, PGM, PPM, EXR and Radiance HDR are recognised by content. JPEG files become MJPG frames, undecoded; 16 bit grey becomes Y16,
 //! or Z16 depth if the unit is given; colour becomes RGB24 (16 bit colour rounded to 8, alpha left out). Colour profiles
 //! and the orientation that phones note are ignored: pixels are the sensor's.
+//!
+//! EXR and HDR become RGBF32: linear light, 1 = code white, exactly as in the file (R G B, or Y three times; alpha left
+//! out). Such a camera has a linear response.
 //!
 //! | option | meaning |
 //! | --- | --- |
@@ -11,6 +14,7 @@
 //! | `pace=realtime` | or `fast`: as fast as frames are asked for, with the same stamps |
 //! | `loop=false` | `true`: begin again after the last file, stamps go on |
 //! | `as=native` | `grey` or `rgb`: decode to 8 bit luminance or R′G′B′ |
+//! | `layer=real` | this layer of EXR files; without it the only one, or the one without a name |
 //! | `depth_unit_m=0.001` | the files are depth, this many metres a count |
 //! | `depth_invalid=65535` | a code that means "no measurement" beside 0 |
 //! | `layout=files` | `tum`: PATH is a folder with `rgb.txt` and `depth.txt`; stamps are the files' |
@@ -20,6 +24,7 @@
 mod camera;
 mod describe;
 mod files;
+mod linear;
 mod natural;
 mod options;
 mod pnm;

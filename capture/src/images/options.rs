@@ -15,6 +15,8 @@ pub struct ImagesOptions {
     pub repeat: bool,
     /// `as`: `native` (default), `grey` or `rgb`.
     pub deliver: Deliver,
+    /// `layer`: which layer of EXR files; without it the only one, or the one without a name.
+    pub layer: Option<String>,
     /// `depth_unit_m`: metres a count; the images are depth then and must be 16 bit grey.
     pub depth_unit_m: Option<f64>,
     /// `depth_invalid`: a code that means "no measurement" beside 0, as 65535 in 7-Scenes.
@@ -40,12 +42,12 @@ pub enum Pace {
 /// What is made of the images.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Deliver {
-    /// What the files hold: JPEG as MJPG frames, grey as GREY or Y16, colour as RGB24.
+    /// What the files hold: JPEG as MJPG frames, grey as GREY or Y16, colour as RGB24, linear light as RGBF32.
     #[default]
     Native,
-    /// 8 bit luminance.
+    /// 8 bit luminance, of linear light sRGB-encoded.
     Grey,
-    /// 8 bit R′G′B′.
+    /// 8 bit R′G′B′, of linear light sRGB-encoded.
     Rgb,
 }
 
@@ -69,8 +71,18 @@ pub enum TumStream {
     Depth,
 }
 
-const KEYS: [&str; 9] =
-    ["fps", "pace", "loop", "as", "depth_unit_m", "depth_invalid", "layout", "stream", "associate_s"];
+const KEYS: [&str; 10] = [
+    "fps",
+    "pace",
+    "loop",
+    "as",
+    "layer",
+    "depth_unit_m",
+    "depth_invalid",
+    "layout",
+    "stream",
+    "associate_s",
+];
 
 impl ImagesOptions {
     /// Options for `path` with every default.
@@ -81,6 +93,7 @@ impl ImagesOptions {
             pace: Pace::default(),
             repeat: false,
             deliver: Deliver::default(),
+            layer: None,
             depth_unit_m: None,
             depth_invalid: None,
             layout: Layout::default(),
@@ -122,6 +135,7 @@ impl ImagesOptions {
                 let kinds = [("native", Deliver::Native), ("grey", Deliver::Grey), ("rgb", Deliver::Rgb)];
                 self.deliver = one_of(key, value, &kinds)?;
             }
+            "layer" => self.layer = Some(value.to_owned()),
             "depth_unit_m" => self.depth_unit_m = Some(number(key, value, 1e-9..=1e3)?),
             "depth_invalid" => {
                 let code =
@@ -152,6 +166,9 @@ impl ImagesOptions {
             return Err("option `depth_unit_m` is for stream=depth".into());
         }
         let is_depth = is_tum_depth || self.depth_unit_m.is_some();
+        if is_depth && self.layer.is_some() {
+            return Err("option `layer` is for EXR images; depth is 16 bit grey and has none".into());
+        }
         if is_depth && self.deliver != Deliver::Native {
             return Err("option `as`: depth is delivered as Z16; leave out `as`, or the depth unit".into());
         }
@@ -227,6 +244,7 @@ mod tests {
             ("x?fps=1&loop", "`loop` has no value"),
             ("x?stream=rgb", "`stream` is for layout=tum"),
             ("x?layout=tum&fps=30", "a TUM folder has its own times"),
+            ("x?depth_unit_m=0.001&layer=Z", "option `layer` is for EXR images"),
             ("x?depth_unit_m=0.001&as=grey", "depth is delivered as Z16"),
             ("x?depth_invalid=65535", "`depth_invalid` needs `depth_unit_m`"),
             ("x?depth_unit_m=0.001&depth_invalid=70000", "a code from 1 to 65535"),

@@ -6,6 +6,7 @@ use std::path::Path;
 use image::codecs::png::PngDecoder;
 use image::{ColorType, ImageDecoder, Limits};
 
+use super::linear;
 use super::options::Deliver;
 use super::pnm::PnmHeader;
 use crate::convert::Converter;
@@ -17,7 +18,7 @@ use crate::pool::{FramePool, PixelBuffer, PixelBufferMut};
 /// Largest image file that is read.
 const MAX_FILE_BYTES: u64 = 1 << 30;
 /// No image compresses better than this: deflate's limit is 1032.
-const MAX_COMPRESSION: u64 = 1100;
+pub(super) const MAX_COMPRESSION: u64 = 1100;
 
 /// What is to be made of a file's samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,22 +50,22 @@ pub(super) struct Probe {
     pub(super) height_px: u32,
 }
 
-/// Reads as much of the file as its header takes.
-pub(super) fn probe(path: &Path) -> Result<Probe, String> {
+/// Reads as much of the file as its header takes. `layer` is the wanted one of an EXR file.
+pub(super) fn probe(path: &Path, layer: Option<&str>) -> Result<Probe, String> {
     const HEADER_BYTES: u64 = 1 << 16;
     let mut bytes = Vec::new();
     let file_bytes = read_bytes(path, HEADER_BYTES, &mut bytes)?;
-    let probed = probe_bytes(&bytes);
+    let probed = probe_bytes(&bytes, layer);
     if probed.is_err() && file_bytes > HEADER_BYTES {
-        // A JPEG image may carry more than that (a preview, a colour profile) before its header.
+        // An image may carry more than that (a preview, a colour profile) in or before its header.
         read_bytes(path, MAX_FILE_BYTES, &mut bytes)?;
-        return probe_bytes(&bytes);
+        return probe_bytes(&bytes, layer);
     }
     probed
 }
 
-fn probe_bytes(bytes: &[u8]) -> Result<Probe, String> {
-    let (format, width_px, height_px) = match Kind::of(bytes)? {
+fn probe_bytes(bytes: &[u8], layer: Option<&str>) -> Result<Probe, String> {
+    let (format, width_px, height_px) = match Kind::of_layer(bytes, layer)? {
         Kind::Jpeg => {
             let [width_px, height_px, _] = jpeg::image_size(bytes).map_err(|error| error.to_string())?;
             (PixelFormat::Mjpg, width_px, height_px)
@@ -82,6 +83,11 @@ fn probe_bytes(bytes: &[u8]) -> Result<Probe, String> {
             let decoder = png_decoder(bytes)?;
             let (width_px, height_px) = decoder.dimensions();
             (png_format(decoder.color_type())?, width_px, height_px)
+        }
+        Kind::Linear => {
+            let layer = linear::layer(bytes, layer)?;
+            let side = |px| u32::try_from(px).unwrap_or(u32::MAX);
+            (PixelFormat::RgbF32, side(layer.width), side(layer.height))
         }
     };
     check_size(width_px, height_px)?;
@@ -101,6 +107,8 @@ enum Kind {
     Png,
     Jpeg,
     Pnm,
+    /// EXR or Radiance HDR.
+    Linear,
 }
 
 impl Kind {
@@ -109,8 +117,19 @@ impl Kind {
             [0x89, b'P', b'N', b'G', ..] => Ok(Self::Png),
             [0xFF, 0xD8, ..] => Ok(Self::Jpeg),
             [b'P', b'1'..=b'6', ..] => Ok(Self::Pnm),
+            [0x76, 0x2f, 0x31, 0x01, ..] | [b'#', b'?', ..] => Ok(Self::Linear),
             [] => Err("the file is empty".into()),
-            _ => Err("neither PNG, JPEG, PGM nor PPM".into()),
+            _ => Err("neither PNG, JPEG, PGM, PPM, EXR nor HDR".into()),
+        }
+    }
+
+    /// [`of`](Self::of) a file of which a layer may be wanted.
+    fn of_layer(bytes: &[u8], layer: Option<&str>) -> Result<Self, String> {
+        match (Self::of(bytes)?, layer) {
+            (Self::Png | Self::Jpeg | Self::Pnm, Some(_)) => {
+                Err("no EXR image, and others have no layers: leave out `layer`".into())
+            }
+            (kind, _) => Ok(kind),
         }
     }
 }
@@ -152,18 +171,30 @@ fn read_bytes(path: &Path, limit: u64, bytes: &mut Vec<u8>) -> Result<u64, Strin
 #[derive(Debug)]
 pub(super) struct Reader {
     target: Target,
+    layer: Option<String>,
     pool: FramePool,
     converter: Converter,
     file: Vec<u8>,
     samples: Vec<u8>,
+    /// What was last told of a header.
+    noted: Vec<String>,
 }
 
 impl Reader {
-    pub(super) fn new(target: Target) -> Self {
+    /// `layer` is the wanted one of EXR files.
+    pub(super) fn new(target: Target, layer: Option<String>) -> Self {
         /// Enough for a pipeline; a reader that keeps more frames costs memory, not frames.
         const POOLED_FRAMES: usize = 8;
         let pool = FramePool::new(POOLED_FRAMES, 0);
-        Self { target, pool, converter: Converter::new(), file: Vec::new(), samples: Vec::new() }
+        Self {
+            target,
+            layer,
+            pool,
+            converter: Converter::new(),
+            file: Vec::new(),
+            samples: Vec::new(),
+            noted: Vec::new(),
+        }
     }
 
     /// The frame in a file.
@@ -172,16 +203,17 @@ impl Reader {
     /// A sentence that says what is wrong with the file.
     pub(super) fn read(&mut self, path: &Path) -> Result<Frame, String> {
         let mut file = std::mem::take(&mut self.file);
-        let frame = read_bytes(path, MAX_FILE_BYTES, &mut file).and_then(|_| self.frame(&file));
+        let frame = read_bytes(path, MAX_FILE_BYTES, &mut file).and_then(|_| self.frame(path, &file));
         self.file = file;
         frame
     }
 
-    fn frame(&mut self, bytes: &[u8]) -> Result<Frame, String> {
-        let frame = match Kind::of(bytes)? {
+    fn frame(&mut self, path: &Path, bytes: &[u8]) -> Result<Frame, String> {
+        let frame = match Kind::of_layer(bytes, self.layer.as_deref())? {
             Kind::Jpeg => self.jpeg(bytes),
             Kind::Pnm => self.pnm(bytes),
             Kind::Png => self.png(bytes),
+            Kind::Linear => self.linear(path, bytes),
         }?;
         self.deliver(frame)
     }
@@ -199,7 +231,7 @@ impl Reader {
     }
 
     fn pnm(&mut self, bytes: &[u8]) -> Result<Frame, String> {
-        let Probe { format, width_px, height_px } = probe_bytes(bytes)?;
+        let Probe { format, width_px, height_px } = probe_bytes(bytes, None)?;
         let header = PnmHeader::read(bytes)?;
         if (bytes.len() as u64) < header.least_bytes() {
             return Err(format!(
@@ -245,6 +277,21 @@ impl Reader {
             Ok(())
         })?;
         frame(format, width_px, height_px, pixels)
+    }
+
+    fn linear(&mut self, path: &Path, bytes: &[u8]) -> Result<Frame, String> {
+        let layer = linear::layer(bytes, self.layer.as_deref())?;
+        let (image, notes) = linear::read(bytes, &layer)?;
+        // Once, not with each of a thousand frames.
+        if notes != self.noted {
+            notes.iter().for_each(|note| tracing::warn!("{}: {note}", path.display()));
+            self.noted = notes;
+        }
+        let side = |px| u32::try_from(px).map_err(|_| format!("{px} pixels a side"));
+        let (width_px, height_px) = (side(image.width())?, side(image.height())?);
+        let len = row_bytes(PixelFormat::RgbF32, width_px) * height_px as usize;
+        let pixels = fill(&self.pool, len, |pixels| linear::pack(&image, pixels))?;
+        frame(PixelFormat::RgbF32, width_px, height_px, pixels)
     }
 
     /// From what the file holds to what is asked for.
