@@ -44,12 +44,13 @@ pub fn sensors(session: &Session) -> anyhow::Result<Vec<Sensor>> {
         .collect()
 }
 
-/// Reads a calibration and brings it to the size that the camera delivers.
+/// Reads a calibration and brings it to the size that the camera delivers, whose format must have its response.
 pub fn calibration_for(camera: &dyn Camera, file: &Path) -> anyhow::Result<Calibration> {
     let stream = camera.stream();
-    let (scaled, warning) = Calibration::read(file)?
-        .scaled_to([stream.width_px, stream.height_px])
-        .with_context(|| format!("{} does not fit {}", file.display(), camera.name()))?;
+    let unfit = || format!("{} does not fit {}", file.display(), camera.name());
+    let calibration = Calibration::read(file)?;
+    stream.format.check_response(&calibration.response).with_context(unfit)?;
+    let (scaled, warning) = calibration.scaled_to([stream.width_px, stream.height_px]).with_context(unfit)?;
     if let Some(warning) = warning {
         tracing::warn!("{}: {warning}", file.display());
     }

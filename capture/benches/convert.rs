@@ -16,6 +16,12 @@ fn raw_frame(format: PixelFormat) -> Frame {
     Frame::packed(format, WIDTH, HEIGHT, pixels).unwrap()
 }
 
+fn linear_frame() -> Frame {
+    let values = (0..WIDTH * HEIGHT * 3).map(|n| ((n / 7 + n / 1280 * 3) % 1200) as f32 / 1000.0);
+    let pixels: Vec<u8> = values.flat_map(f32::to_le_bytes).collect();
+    Frame::packed(PixelFormat::RgbF32, WIDTH, HEIGHT, pixels).unwrap()
+}
+
 fn jpeg_frame() -> Frame {
     let picture = image::RgbImage::from_fn(WIDTH, HEIGHT, |x, y| {
         image::Rgb([(x / 5) as u8, (y / 3) as u8, ((x * y) >> 9) as u8])
@@ -45,7 +51,7 @@ fn convert(criterion: &mut Criterion) {
         }
     }
     let mut converter = Converter::new();
-    for frame in [raw_frame(PixelFormat::Yuyv), raw_frame(PixelFormat::Rgb24), jpeg_frame()] {
+    for frame in [raw_frame(PixelFormat::Yuyv), raw_frame(PixelFormat::Rgb24), linear_frame(), jpeg_frame()] {
         let format = frame.format;
         group.bench_function(format!("{format} to GREY"), |b| {
             b.iter(|| converter.grey(black_box(&frame), black_box(&mut grey)).unwrap());
@@ -54,10 +60,11 @@ fn convert(criterion: &mut Criterion) {
             b.iter(|| converter.rgb_f32(black_box(&frame), black_box(&mut numbers)).unwrap());
         });
     }
-    let frame = jpeg_frame();
-    group.bench_function("MJPG to RGB24", |b| {
-        b.iter(|| converter.rgb24(black_box(&frame), black_box(&mut rgb)).unwrap());
-    });
+    for frame in [linear_frame(), jpeg_frame()] {
+        group.bench_function(format!("{} to RGB24", frame.format), |b| {
+            b.iter(|| converter.rgb24(black_box(&frame), black_box(&mut rgb)).unwrap());
+        });
+    }
     group.finish();
 }
 

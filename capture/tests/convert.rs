@@ -18,6 +18,7 @@ struct Peers {
     height: u32,
     yuv: Vec<YuvCase>,
     flat: Vec<FlatCase>,
+    linear: LinearCase,
     jpeg: Vec<JpegCase>,
 }
 
@@ -43,6 +44,12 @@ struct FlatCase {
     range: YuvRange,
     yuv: [u8; 3],
     rgb: [u8; 3],
+}
+
+#[derive(Deserialize)]
+struct LinearCase {
+    data: String,
+    rgb: String,
 }
 
 #[derive(Deserialize)]
@@ -296,6 +303,14 @@ fn sixteen_bits_become_eight_by_rounding() {
             assert_eq!(*number, [f32::from(code) / 65535.0; 3]);
         }
     }
+}
+
+#[test]
+fn linear_light_of_any_size_is_bit_exact_against_float64() {
+    let LinearCase { data, rgb } = &PEERS.linear;
+    let frame = Frame::packed(PixelFormat::RgbF32, PEERS.width, PEERS.height, bytes(data)).unwrap();
+    assert_eq!(rgb24(&frame, Default::default()), bytes(rgb));
+    assert_eq!(rgb24(&padded(&frame), Default::default()), bytes(rgb), "with padding");
 }
 
 #[test]

@@ -14,7 +14,7 @@ use crate::pose::Rigid;
 use crate::random::name_seed;
 use crate::rolling_shutter::RollingShutter;
 use crate::sensor::encode::{self, EncodeError};
-use crate::sensor::{DepthSensor, Exposure, ImageSensor};
+use crate::sensor::{DepthSensor, Exposure, FormatSpec, ImageSensor};
 use crate::timing::Timing;
 use crate::tracer::{DepthSample, Tracer, View};
 use crate::world::{MountSpec, SensorSpec, World};
@@ -209,7 +209,7 @@ impl SimSensor {
     /// A frame as the sensor delivers it, with its stamps, exposed as `exposure` says (which a depth sensor ignores).
     ///
     /// # Errors
-    /// [`EncodeError`] for a size that the format cannot have.
+    /// [`EncodeError`] for a size that the format cannot have, and for light that it cannot.
     pub fn frame(&self, frame: u64, exposure: &Exposure) -> Result<Frame, EncodeError> {
         let size_px = self.calibration().size_px;
         let made = match &self.depth {
@@ -219,6 +219,10 @@ impl SimSensor {
                 let mut made = Frame::packed(PixelFormat::Z16, size_px[0], size_px[1], bytes)?;
                 made.depth_unit_m = Some(depth.spec().unit_m);
                 made
+            }
+            None if self.spec.format == FormatSpec::RgbF32 => {
+                let signal = self.image.signal(&self.radiance(frame, Sees::RealOnly), exposure, frame);
+                encode::encode_linear(&signal, size_px)?
             }
             None => {
                 let codes = self.image.codes(&self.radiance(frame, Sees::RealOnly), exposure, frame);

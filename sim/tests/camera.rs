@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use coshade_capture::{Camera, CaptureError, Control, ControlValue, Converter, Frame};
-use coshade_lens::calibration::{Calibration, Noise};
+use coshade_lens::calibration::{Calibration, Noise, Response, Vignetting};
 use coshade_reference::accel::Sees;
 use coshade_sim::sensor::Exposure;
 use coshade_sim::tracer::Room;
@@ -67,6 +67,52 @@ fn white_balance_and_gain_do_what_they_say() {
     let darker = frames(&mut camera, 1).remove(0);
     assert!(channel(&darker, 1) < channel(&before, 1));
     assert_eq!(darker.gain, Some(0.5));
+}
+
+#[test]
+fn a_linear_sensor_delivers_the_radiance_times_what_its_calibration_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut calibration = Calibration::default_for([32, 24], 1.0).unwrap();
+    let (center_px, radius_px) = ([15.5, 11.5], 20.0);
+    calibration.vignetting = Vignetting::Radial { center_px, radius_px, coefficients: vec![-0.4] };
+    let file = folder.path().join("linear.toml");
+    let world = |text: &str| World::parse(text, folder.path().join("room.toml")).unwrap();
+    let text =
+        "version = 1\nduration_s = 1\n[sensor.camera]\ncalibration = 'linear.toml'\nformat = 'rgbf32'\n";
+
+    // The response of its calibration must be linear.
+    calibration.write(&file).unwrap();
+    let error = world(text).calibration("camera").unwrap_err().to_string();
+    for part in ["sensor camera", "linear.toml", "RGBF32", "`srgb`", "kind = \"linear\""] {
+        assert!(error.contains(part), "{error}");
+    }
+    calibration.response = Response::Linear;
+    calibration.write(&file).unwrap();
+
+    let sensor = world(text).sensor("camera", Arc::new(Room::default())).unwrap();
+    let exposure = Exposure { time: 3.0, gain: 2.5, ..Exposure::default() };
+    let frame = sensor.frame(0, &exposure).unwrap();
+    let found: Vec<[f32; 3]> = (0..24).flat_map(|y| frame.rgb_f32_row(y)).collect();
+    for (pixel, (found, radiance)) in found.iter().zip(sensor.radiance(0, Sees::RealOnly)).enumerate() {
+        let (x, y) = ((pixel % 32) as f64 - center_px[0], (pixel / 32) as f64 - center_px[1]);
+        let falloff = 1.0 - 0.4 * (x * x + y * y) / (radius_px * radius_px);
+        for (found, radiance) in found.iter().zip(radiance) {
+            let exact = f64::from(radiance) * 3.0 * 2.5 * falloff;
+            // The falloff and the frame are rounded to 24 bits.
+            assert!(
+                (f64::from(*found) - exact).abs() <= exact * 2.0 * f64::from(f32::EPSILON),
+                "{found} {exact}"
+            );
+        }
+    }
+    assert!(found.iter().flatten().any(|value| *value > 4.0), "0.7 · 7.5 in the middle is not clipped");
+
+    // Without vignetting, at the calibration's exposure, it is the radiance itself.
+    let plain = self::sensor("format = 'rgbf32'\n");
+    let frame = plain.frame(7, &Exposure::default()).unwrap();
+    let found: Vec<[f32; 3]> = (0..24).flat_map(|y| frame.rgb_f32_row(y)).collect();
+    assert_eq!(found, plain.radiance(7, Sees::RealOnly));
+    assert_eq!(plain.calibration().response, Response::Linear);
 }
 
 #[test]

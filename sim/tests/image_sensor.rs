@@ -157,6 +157,26 @@ fn vignetting_is_what_was_asked() {
 }
 
 #[test]
+fn noise_of_the_signal_is_neither_clipped_nor_quantised() {
+    let (shot, read) = (0.002, 0.000_4);
+    let sensor = sensor(|calibration| calibration.noise = noise(shot, read));
+    // In the dark half of the read noise lies below 0; far above white nothing clips.
+    for light in [0.0_f32, 3.0] {
+        let field = vec![[light; 3]; PIXELS];
+        let signal: Vec<f64> = (0..24)
+            .flat_map(|frame| sensor.signal(&field, &Exposure::default(), frame))
+            .flat_map(|pixel| pixel.map(f64::from))
+            .collect();
+        let count = signal.len() as f64;
+        let mean = signal.iter().sum::<f64>() / count;
+        let variance = signal.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count;
+        let expected = shot * f64::from(light) + read;
+        assert!((mean - f64::from(light)).abs() < 5.0 * (expected / count).sqrt(), "{mean}");
+        assert!((variance / expected - 1.0).abs() < 5.0 * (2.0 / count).sqrt(), "{variance}");
+    }
+}
+
+#[test]
 fn exposure_gain_and_colours_scale_light() {
     let sensor = sensor(|calibration| {
         calibration.radiometric.scale = 2.0;

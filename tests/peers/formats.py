@@ -8,6 +8,7 @@
   ITU in float64, with nearest and with linear chroma (siting of MPEG-2: on even columns, between rows);
   and OpenCV's (BT.601, limited, nearest).
 - `flat`: frames of one colour by FFmpeg's swscale, for each matrix and range: an independent view of the coefficients.
+- `linear`: RGBF32 frames of light, and its sRGB codes by the formula of IEC 61966-2-1 in float64.
 - `jpeg`: small JPEG images and what Pillow (libjpeg-turbo, slow integer IDCT, fancy upsampling) decodes.
 
 Bytes are written as hexadecimal text.
@@ -155,6 +156,25 @@ def jpeg_cases():
             }
 
 
+def srgb(light):
+    light = np.clip(light, 0, 1)
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+
+
+def linear_case():
+    """All orders of magnitude, both signs, and the numbers just beside the light of codes n + 1/2."""
+    own = np.random.default_rng(20261122)
+    code = (np.arange(128) * 2 + 0.5) / 255
+    edges = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    light = np.concatenate([
+        own.choice([-1, 1], 128) * 10.0 ** own.uniform(-30, 30, 128),
+        np.nextafter(edges, np.float32(0)),
+        np.nextafter(edges, np.float32(2)),
+    ]).astype("<f4")
+    assert light.size == 3 * WIDTH * HEIGHT
+    return {"data": hexadecimal(light), "rgb": hexadecimal(np.rint(255 * srgb(light.astype(float))).astype(np.uint8))}
+
+
 def main():
     table = {
         "made_with": f"numpy {np.__version__}, opencv {cv2.__version__}, pyav {av.__version__}, "
@@ -163,6 +183,7 @@ def main():
         "height": HEIGHT,
         "yuv": list(yuv_cases()),
         "flat": list(flat_cases()),
+        "linear": linear_case(),
         "jpeg": list(jpeg_cases()),
     }
     path = Path(__file__).resolve().parents[2] / "capture/tests/data/formats.json"

@@ -10,6 +10,8 @@ use anyhow::{Context, anyhow, bail};
 use coshade_capture::recording::Reader;
 use coshade_capture::replay::{Playback, Rate, ReplayCamera, ReplayOptions};
 use coshade_capture::{Camera, CaptureError, Converter, Frame, PixelFormat, Timestamp, clock};
+use coshade_image_file::{Image, LayeredImage, Precision, write_exr};
+use glam::Vec3;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -34,7 +36,8 @@ pub struct Args {
     /// Play again and again, until Ctrl-C
     #[arg(long = "loop")]
     looping: bool,
-    /// Write the frames here as STREAM/000000.png (colour, grey, 16 bit depth) or .jpg (as it came from the camera)
+    /// Write the frames here as STREAM/000000.png (colour, grey, 16 bit depth), .jpg (as it came from the camera) or
+    /// .exr (linear light)
     #[arg(long, value_name = "FOLDER", conflicts_with = "looping")]
     export: Option<PathBuf>,
     /// Print one JSON object: `duration_s` (wall clock), and `streams`, each with `name`, `frames`, `damaged`,
@@ -236,7 +239,11 @@ impl Export {
     }
 
     fn write(&mut self, frame: &Frame) -> anyhow::Result<()> {
-        let ending = if frame.format == PixelFormat::Mjpg { "jpg" } else { "png" };
+        let ending = match frame.format {
+            PixelFormat::Mjpg => "jpg",
+            PixelFormat::RgbF32 => "exr",
+            _ => "png",
+        };
         let path = self.folder.join(format!("{:06}.{ending}", self.written));
         self.written += 1;
         let written = self.write_file(&path, frame).with_context(|| path.display().to_string());
@@ -251,6 +258,12 @@ impl Export {
         let (width, height) = (frame.width_px, frame.height_px);
         match frame.format {
             PixelFormat::Mjpg => Ok(std::fs::write(path, &frame.pixels[..])?),
+            PixelFormat::RgbF32 => {
+                let pixels: Vec<Vec3> =
+                    (0..height).flat_map(|y| frame.rgb_f32_row(y)).map(Vec3::from_array).collect();
+                let image = Image::from_rgb(width as usize, height as usize, &pixels)?;
+                Ok(write_exr(path, &LayeredImage::single(image), Precision::Float)?)
+            }
             PixelFormat::Grey => {
                 let rows: Vec<u8> = (0..height).filter_map(|y| frame.row(y)).flatten().copied().collect();
                 Ok(image::save_buffer(path, &rows, width, height, image::ColorType::L8)?)

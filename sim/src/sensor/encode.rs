@@ -1,4 +1,4 @@
-//! From R′G′B′ codes to the bytes of a pixel format: the inverse of `coshade_capture::convert`.
+//! From R′G′B′ codes or linear light to the bytes of a pixel format: the inverse of `coshade_capture::convert`.
 
 use coshade_capture::{ColorEncoding, Frame, FrameError, PixelFormat, YuvMatrix, YuvRange};
 use image::codecs::jpeg::JpegEncoder;
@@ -24,6 +24,9 @@ pub enum FormatSpec {
     Grey,
     /// R′G′B′.
     Rgb24,
+    /// Linear light as 32 bit floating point: the sensor's signal without response, clipping and quantisation. Its
+    /// calibration has a linear response.
+    RgbF32,
     /// Motion JPEG, quality 92, chroma at full resolution.
     Mjpg,
     /// Depth: makes the sensor a depth camera.
@@ -39,6 +42,7 @@ impl FormatSpec {
             Self::Nv12 => PixelFormat::Nv12,
             Self::Grey => PixelFormat::Grey,
             Self::Rgb24 => PixelFormat::Rgb24,
+            Self::RgbF32 => PixelFormat::RgbF32,
             Self::Mjpg => PixelFormat::Mjpg,
             Self::Z16 => PixelFormat::Z16,
         }
@@ -55,7 +59,7 @@ pub enum EncodeError {
     #[error("JPEG: {0}")]
     Jpeg(#[from] image::ImageError),
     /// No image format.
-    #[error("{0} holds no colours")]
+    #[error("{0} holds no codes of colours")]
     NoImage(PixelFormat),
 }
 
@@ -100,6 +104,15 @@ pub fn encode(codes: &[u8], [width, height]: [u32; 2], format: PixelFormat) -> R
     };
     frame.color = color(format);
     Ok(frame)
+}
+
+/// A frame of linear light (row by row), without stamps.
+///
+/// # Errors
+/// [`EncodeError::Frame`] for light that is no number, or infinite.
+pub fn encode_linear(light: &[[f32; 3]], [width, height]: [u32; 2]) -> Result<Frame, EncodeError> {
+    let bytes: Vec<u8> = light.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect();
+    Ok(Frame::packed(PixelFormat::RgbF32, width, height, bytes)?)
 }
 
 fn jpeg(codes: &[u8], [width, height]: [u32; 2]) -> Result<Vec<u8>, EncodeError> {

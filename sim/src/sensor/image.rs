@@ -67,38 +67,47 @@ impl ImageSensor {
         [own.x * balance[0], own.y * balance[1], own.z * balance[2]].map(|x| (x * factor).max(0.0))
     }
 
-    /// The code values of a frame, R′G′B′ with 8 bits, row by row. The same for the same seed, frame number, radiance and
-    /// exposure, whatever the number of threads.
-    pub fn codes(&self, radiance: &[[f32; 3]], exposure: &Exposure, frame: u64) -> Vec<u8> {
-        let width = self.calibration.size_px[0] as usize;
-        let mut codes = vec![0; radiance.len() * 3];
-        let rows = codes
-            .par_chunks_mut(width * 3)
-            .zip(radiance.par_chunks(width))
-            .zip(self.falloff.par_chunks(width));
-        rows.enumerate().for_each(|(row, ((codes, radiance), falloff))| {
-            let pixels = codes.as_chunks_mut::<3>().0.iter_mut().zip(radiance).zip(falloff);
-            for (column, ((codes, radiance), falloff)) in pixels.enumerate() {
-                let light = self.pixel_light(radiance, *falloff, exposure);
-                *codes = self.pixel_codes(light, exposure, frame, (row * width + column) as u64);
-            }
-        });
-        codes
+    /// [`light`](Self::light) with the calibration's noise, if it has any: what the response, clipping and quantisation
+    /// begin with. The same for the same seed, frame number, radiance and exposure, whatever the number of threads.
+    pub fn signal(&self, radiance: &[[f32; 3]], exposure: &Exposure, frame: u64) -> Vec<[f32; 3]> {
+        self.each_pixel(radiance, exposure, frame, |signal| signal.map(|x| x as f32))
     }
 
-    fn pixel_codes(&self, light: [f64; 3], exposure: &Exposure, frame: u64, pixel: u64) -> [u8; 3] {
-        let mut random = Random::at(self.seed, self.sensor, Purpose::ImageNoise, frame, pixel);
-        let (shot, read) = match &self.calibration.noise {
-            Some(noise) => noise.at(Some(exposure.gain)),
-            None => (0.0, 0.0),
-        };
-        let channels = [(Channel::Red, light[0]), (Channel::Green, light[1]), (Channel::Blue, light[2])];
-        channels.map(|(channel, light)| {
-            let noisy = noisy(light, shot, read, &mut random).clamp(0.0, 1.0);
-            let code = self.calibration.response.forward(channel, noisy);
+    /// The code values of a frame, R′G′B′ with 8 bits, row by row: the response to [`signal`](Self::signal).
+    pub fn codes(&self, radiance: &[[f32; 3]], exposure: &Exposure, frame: u64) -> Vec<u8> {
+        let code = |(signal, channel): (f64, Channel)| {
+            let code = self.calibration.response.forward(channel, signal.clamp(0.0, 1.0));
             // A cast of a number that is none gives 0.
             (code * 255.0).round().clamp(0.0, 255.0) as u8
-        })
+        };
+        let codes = self.each_pixel(radiance, exposure, frame, |[red, green, blue]| {
+            [(red, Channel::Red), (green, Channel::Green), (blue, Channel::Blue)].map(code)
+        });
+        codes.into_flattened()
+    }
+
+    /// What `convert` makes of the signal of every pixel.
+    fn each_pixel<T: Send>(
+        &self,
+        radiance: &[[f32; 3]],
+        exposure: &Exposure,
+        frame: u64,
+        convert: impl Fn([f64; 3]) -> T + Sync,
+    ) -> Vec<T> {
+        let pixels = radiance.par_iter().zip(&self.falloff).enumerate();
+        pixels
+            .map(|(pixel, (radiance, falloff))| {
+                let light = self.pixel_light(radiance, *falloff, exposure);
+                convert(self.pixel_signal(light, exposure, frame, pixel as u64))
+            })
+            .collect()
+    }
+
+    fn pixel_signal(&self, light: [f64; 3], exposure: &Exposure, frame: u64, pixel: u64) -> [f64; 3] {
+        let Some(noise) = &self.calibration.noise else { return light };
+        let mut random = Random::at(self.seed, self.sensor, Purpose::ImageNoise, frame, pixel);
+        let (shot, read) = noise.at(Some(exposure.gain));
+        light.map(|light| noisy(light, shot, read, &mut random))
     }
 }
 

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | [`image`] | exposure, vignetting, noise, response, quantisation |
 //! | [`white_balance`] | what a colour temperature does to the channels |
-//! | [`encode`] | R′G′B′ codes to a pixel format |
+//! | [`encode`] | R′G′B′ codes or linear light to a pixel format |
 //! | [`depth`] | a structured-light depth sensor |
 
 pub mod depth;

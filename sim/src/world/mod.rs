@@ -9,7 +9,7 @@ use std::path::{Path as FilePath, PathBuf};
 use std::sync::Arc;
 
 use coshade_config::{Document, Error, Problem};
-use coshade_lens::calibration::{Calibration, CalibrationError};
+use coshade_lens::calibration::{Calibration, CalibrationError, Response};
 use coshade_reference::emitter::{Environment, EnvironmentFile, EnvironmentFileError};
 use coshade_reference::integrator::{TraceError, TraceScene};
 use coshade_tracker::Board;
@@ -22,6 +22,7 @@ use crate::cache::ContentHash;
 use crate::device::SimSensor;
 use crate::path::Path;
 use crate::pose::Rigid;
+use crate::sensor::FormatSpec;
 use crate::tracer::{PathTracer, Tracer};
 
 /// Why a world cannot be used.
@@ -40,7 +41,7 @@ pub enum WorldError {
     },
     /// A sensor's image cannot have its format.
     #[error("sensor {sensor}: {reason}")]
-    Size {
+    Format {
         /// Name of the sensor.
         sensor: String,
         /// Why.
@@ -200,7 +201,8 @@ impl World {
     /// The true calibration of a sensor.
     ///
     /// # Errors
-    /// [`WorldError::NoSensor`], [`WorldError::Calibration`], or [`WorldError::Size`] if the format cannot have its size.
+    /// [`WorldError::NoSensor`], [`WorldError::Calibration`], or [`WorldError::Format`] if the format cannot have its size
+    /// or response.
     pub fn calibration(&self, sensor: &str) -> Result<Calibration, WorldError> {
         let spec = self.sensor_spec(sensor)?;
         let calibration = match (&spec.calibration, spec.size_px, spec.fov_deg) {
@@ -210,14 +212,22 @@ impl World {
                 Calibration::default_for(size_px.unwrap_or([1, 1]), fov_deg.unwrap_or(60.0).to_radians())
             }
         };
-        let calibration = calibration.map_err(|source| WorldError::Calibration {
+        let mut calibration = calibration.map_err(|source| WorldError::Calibration {
             sensor: sensor.to_owned(),
             source: Box::new(source),
         })?;
-        match check::odd_size(spec.format, calibration.size_px) {
-            Some(reason) => Err(WorldError::Size { sensor: sensor.to_owned(), reason }),
-            None => Ok(calibration),
+        let unfit = |reason: String| WorldError::Format { sensor: sensor.to_owned(), reason };
+        if spec.format == FormatSpec::RgbF32 && spec.calibration.is_none() {
+            calibration.response = Response::Linear;
+            calibration.provenance.notes = None;
         }
+        if let Some(reason) = check::odd_size(spec.format, calibration.size_px) {
+            return Err(unfit(reason));
+        }
+        let file = || spec.calibration.as_deref().unwrap_or(FilePath::new("")).display();
+        let checked = spec.format.pixel_format().check_response(&calibration.response);
+        checked.map_err(|error| unfit(format!("{}: {error}", file())))?;
+        Ok(calibration)
     }
 
     /// A sensor that sees this world through a tracer.

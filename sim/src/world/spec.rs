@@ -112,7 +112,7 @@ pub struct SensorSpec {
     /// and `fov_deg`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<PathBuf>,
-    /// Image size of a sensor without distortion, vignetting and noise, of sRGB response.
+    /// Image size of a sensor without distortion, vignetting and noise, of sRGB response (linear for `rgbf32`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = 1, max = 16384)))]
     pub size_px: Option<[u32; 2]>,

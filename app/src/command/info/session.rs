@@ -18,8 +18,12 @@ pub fn look(path: &Path) -> anyhow::Result<Found> {
         Err(error) if !error.problems().is_empty() => return Ok(refused(error.problems())),
         Err(error) => return Err(error.into()),
     };
-    let mut problems: Vec<_> = session.check().iter().map(problem).collect();
+    let files = session.check();
+    let mut problems: Vec<_> = files.iter().map(problem).collect();
     problems.extend(unopenable(&session)?);
+    if !files.iter().any(FileProblem::is_error) {
+        problems.extend(unfit_images(&session)?);
+    }
     Ok(Found { content: serde_json::to_value(session.spec())?, text: text(session.spec()), problems })
 }
 
@@ -49,6 +53,23 @@ fn unopenable(session: &Session) -> anyhow::Result<Vec<Problem>> {
             Problem::new(Severity::Error, message)
         })
         .collect())
+}
+
+/// Images whose headers already show that they, or their calibrations, cannot be used.
+fn unfit_images(session: &Session) -> anyhow::Result<Vec<Problem>> {
+    let registry = sources::registry();
+    let sensors = sources::sensors(session)?;
+    let images = sensors.iter().filter(|sensor| sensor.source.starts_with("images:"));
+    let problem = |sensor: &sources::Sensor| {
+        let opened = registry.open(&sensor.source).map_err(anyhow::Error::from);
+        let checked = opened.and_then(|camera| match &sensor.calibration {
+            Some(file) => sources::calibration_for(camera.as_ref(), file).map(drop),
+            None => Ok(()),
+        });
+        let error = checked.err()?;
+        Some(Problem::new(Severity::Error, format!("[{}]: {error:#}", sensor.name)))
+    };
+    Ok(images.filter_map(problem).collect())
 }
 
 fn text(spec: &SessionSpec) -> String {
