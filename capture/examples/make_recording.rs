@@ -53,7 +53,13 @@ fn frame(format: PixelFormat, index: u64) -> Result<Frame, Box<dyn Error>> {
     let stride = if format == PixelFormat::Mjpg { 0 } else { width * format.bytes_per_row_pixel() + 6 };
     let rows = if format == PixelFormat::Nv12 { height * 3 / 2 } else { height };
     let len = if stride == 0 { 1000 } else { (stride * rows) as usize };
-    let mut frame = Frame::new(format, width, height, stride, pixels(len, index as usize, 3))?;
+    let mut pixels = pixels(len, index as usize, 3);
+    if format == PixelFormat::RgbF32 {
+        // Finite numbers: the exponent's lowest bit is 0, so it is not the one of infinities.
+        let rows = pixels.chunks_exact_mut(stride as usize).flat_map(|row| row.as_chunks_mut::<4>().0);
+        rows.for_each(|number| number[2] &= 0x7f);
+    }
+    let mut frame = Frame::new(format, width, height, stride, pixels)?;
     frame.captured = Timestamp::from_ns(5_000_000_000 + index * 33_333_333 + format as u64);
     frame.arrived = frame.captured + Duration::from_millis(2);
     frame.sequence = 1000 + index;

@@ -1,6 +1,7 @@
 //! What is a frame and what is not.
 
 use coshade_capture::{DepthFrame, Frame, FrameError, PixelFormat};
+use coshade_lens::calibration::Response;
 use proptest::prelude::*;
 
 const FORMATS: [PixelFormat; 9] = [
@@ -98,6 +99,20 @@ fn linear_values_are_read_wherever_rows_begin_and_must_be_finite() {
     }
     let bytes = Frame::packed(PixelFormat::Grey, 12, 1, vec![0; 12]).unwrap();
     assert_eq!(bytes.rgb_f32_row(0).count(), 0, "bytes are no linear values");
+}
+
+#[test]
+fn linear_frames_want_a_linear_response() {
+    let mismatch = PixelFormat::RgbF32.check_response(&Response::Rec709).unwrap_err();
+    assert_eq!((mismatch.format, mismatch.response), (PixelFormat::RgbF32, "rec709"));
+    for (format, response) in [
+        (PixelFormat::RgbF32, Response::Linear),
+        (PixelFormat::RgbF32, Response::Gamma { gamma: 1.0 }),
+        (PixelFormat::Rgb24, Response::Linear),
+        (PixelFormat::Mjpg, Response::Srgb),
+    ] {
+        format.check_response(&response).unwrap();
+    }
 }
 
 #[test]

@@ -6,7 +6,8 @@
 //! and the orientation that phones note are ignored: pixels are the sensor's.
 //!
 //! EXR and HDR become RGBF32: linear light, 1 = code white, exactly as in the file (R G B, or Y three times; alpha left
-//! out). Such a camera has a linear response.
+//! out). Such a camera has a linear response. Unlike the others they are decoded to memory of their own for each frame,
+//! all layers of a file together.
 //!
 //! | option | meaning |
 //! | --- | --- |
