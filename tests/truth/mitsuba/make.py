@@ -32,7 +32,7 @@ TRUTH = Path(__file__).resolve().parents[1]
 # Of the pinhole pictures, a pixel and batch.
 SAMPLES = 4
 FISHEYE_BATCHES, SURFACE_BATCHES = 24, 8
-FEWEST_BATCHES, MOST_BATCHES = 24, 96
+FEWEST_BATCHES, MOST_BATCHES = 28, 96
 # Standard error of the difference, as a share of the difference (root mean squares where nothing virtual is seen). Asked
 # for is 1/20.
 NOISE = 1 / 25
@@ -73,8 +73,8 @@ def surfaces(case, view):
                    for scene in (tracing.mask_scene(case), tracing.surface_scene(case)))
     # Sums of bilinear weights are not quite 1.
     masks = np.round(masks, 6)
-    return {"coverage": masks[..., 0:1], "hit": masks[..., 1], "position": aovs[..., 0:3], "normal": aovs[..., 3:6],
-            "albedo": aovs[..., 6:9]}
+    return {"coverage": masks[..., 0:1], "hit": masks[..., 1], "position": aovs[..., 0:3] / tracing.UNITS,
+            "normal": aovs[..., 3:6], "albedo": aovs[..., 6:9]}
 
 
 def mean_depth(layers, world_from_camera):

@@ -54,7 +54,8 @@ def shifts(lens, places, radius_rad, world_from_camera):
     scene = {"type": "scene", "integrator": {"type": "path", "max_depth": 1}}
     for i, direction in enumerate(directions):
         centre = world_from_camera[:3, :3] @ direction + world_from_camera[:3, 3]
-        scene[f"ball_{i}"] = {"type": "sphere", "center": centre.tolist(), "radius": float(np.sin(radius_rad)),
+        scene[f"ball_{i}"] = {"type": "sphere", "center": (tracing.UNITS * centre).tolist(),
+                              "radius": float(tracing.UNITS * np.sin(radius_rad)),
                               "emitter": {"type": "area", "radiance": tracing.rgb([1, 1, 1])}}
     image = tracing.View(lens, world_from_camera).picture(mi.load_dict(scene), SAMPLES, seed=1)[..., 0]
     y, x = np.indices(image.shape)

@@ -1,4 +1,5 @@
-"""The two scenes, written for Mitsuba by hand. Nothing here comes from the world files, which say the same in their own words.
+"""The two scenes, written for Mitsuba by hand. Nothing here comes from the world files, which say the same in their own
+words.
 
 World: metres, +Z up. Cameras: x right, y down, z forward (OpenCV). Everything reflects diffusely.
 """
@@ -24,10 +25,6 @@ class Case:
 
     def __init__(self, shapes, camera, fisheye, environment=None):
         self.shapes, self.camera, self.fisheye, self.environment = shapes, camera, fisheye, environment
-
-
-def rgb(value):
-    return {"type": "rgb", "value": list(value)}
 
 
 def placed(position, turned_deg=0.0, scale=(1, 1, 1)):
