@@ -8,8 +8,8 @@ use coshade_scene::{LightKind, Similarity, World};
 use glam::{Vec2, Vec3};
 
 use crate::accel::Ray;
-use crate::bsdf::Frame;
 use crate::bsdf::lambert::sample_cosine_hemisphere;
+use crate::bsdf::{Frame, luminance};
 
 /// A lamp as it stands in the world.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,6 +98,16 @@ impl Lamp {
     /// A point drawn uniformly from the area, as seen from `from`; `None` from behind and outside of the cone.
     pub fn sample(&self, from: Vec3, u2: Vec2) -> Option<LampPoint> {
         self.seen_from(from, self.point(u2))
+    }
+
+    /// Luminance of the light that arrives at a place if nothing is in between, from all of the lamp as if from its middle; per
+    /// area across the light. Bounded near the lamp.
+    pub fn sent(&self, from: Vec3) -> f32 {
+        let Some(middle) = self.seen_from(from, self.center) else { return 0.0 };
+        let distance2 = (from - self.center).length_squared();
+        let near = distance2 / distance2.max(self.radius_m() * self.radius_m());
+        // 1/pdf is the solid angle of the lamp.
+        luminance(middle.radiance) / middle.pdf_sr * near
     }
 
     /// Where a ray meets the front, and that point; `None` beside it, from behind, and out of (t_min, t_max).

@@ -7,12 +7,15 @@
 //! | [`environment`] | radiance from far away |
 //! | [`environment_file`] | reading it |
 //! | [`distribution`] | drawing by weight |
+//! | `choice` | drawing a light |
 //!
-//! A light is chosen half by the luminance of its flux, half alike. All densities given out contain the probability of that choice.
+//! A light is chosen half by the luminance of its flux, half alike; among lamps mostly by what each sends to the place that is
+//! lit. All densities given out contain the probability of that choice.
 //!
 //! Lamps are seen by rays, from their front, but they are no triangles: ask [`Lights::lamps_along`] besides
 //! [`crate::accel::Accel::closest`], up to what that hits. They hide nothing.
 
+mod choice;
 pub mod distribution;
 pub mod environment;
 pub mod environment_file;
@@ -29,7 +32,7 @@ use thiserror::Error;
 use crate::accel::{Geometry, Ray};
 use crate::bsdf::lambert::sample_cosine_hemisphere;
 use crate::bsdf::luminance;
-use distribution::Discrete;
+use choice::LightChoice;
 pub use environment::{Environment, EnvironmentError, Interpolation, Layout};
 pub use environment_file::{EnvironmentFile, EnvironmentFileError};
 use glow::Glow;
@@ -112,12 +115,15 @@ enum Light {
     Environment,
 }
 
+/// Of the 24 bits of a random number, 16 are left by a choice of this probability.
+const LEAST_REUSED: f64 = 1.0 / 256.0;
+
 /// All lights of a scene.
 #[derive(Clone, Debug)]
 pub struct Lights {
     lights: Vec<Light>,
     /// `None` if nothing shines.
-    choice: Option<Discrete>,
+    choice: Option<LightChoice>,
     light_of_triangle: HashMap<u32, u32>,
     environment: Option<(u32, Environment)>,
     bounds: Sphere,
@@ -159,7 +165,8 @@ impl Lights {
             (lights.len() as u32 - 1, environment)
         });
         let mut all = Self { lights, choice: None, light_of_triangle, environment, bounds };
-        all.choice = Discrete::new(all.choice_weights());
+        let lamps = all.lights.iter().filter(|light| matches!(light, Light::Lamp(_))).count();
+        all.choice = LightChoice::new(all.choice_weights(), lamps);
         Ok(all)
     }
 
@@ -191,8 +198,12 @@ impl Lights {
     }
 
     /// Chooses a light and a point on it, as seen from `from`. `None` if that one sends nothing there.
+    ///
+    /// What the choice leaves of `u_light` takes the place of `u2.x` as long as it has digits enough: if `u_light` and `u2.y`
+    /// are one stratified pair, the points on each light are stratified, however many others there are.
     pub fn sample(&self, geometry: &Geometry, from: Vec3, u_light: f32, u2: Vec2) -> Option<LightSample> {
-        let choice = self.choice.as_ref()?.sample(u_light);
+        let choice = self.choice.as_ref()?.sample(u_light, |lamp| self.sent(lamp, from));
+        let u2 = if choice.probability >= LEAST_REUSED { Vec2::new(choice.rest, u2.y) } else { u2 };
         let probability = choice.probability as f32;
         let light = choice.index as u32;
         let to_point = |target: Vec3, radiance, pdf_sr: f32, world| {
@@ -247,7 +258,7 @@ impl Lights {
             Some(LampHit {
                 t,
                 radiance: point.radiance,
-                pdf: point.pdf_sr * self.probability(number),
+                pdf: point.pdf_sr * self.probability(number, ray.origin),
                 world: lamp.world,
                 light: number,
             })
@@ -261,7 +272,7 @@ impl Lights {
             return 0.0;
         };
         match self.lights.get(number as usize) {
-            Some(Light::Glow(glow)) => glow.pdf_sr(from, position) * self.probability(number),
+            Some(Light::Glow(glow)) => glow.pdf_sr(from, position) * self.probability(number, from),
             _ => 0.0,
         }
     }
@@ -271,7 +282,7 @@ impl Lights {
         let Some((number, environment)) = &self.environment else {
             return 0.0;
         };
-        environment.pdf_sr(direction) * self.probability(*number)
+        environment.pdf_sr(direction) * self.probability(*number, Vec3::ZERO)
     }
 
     /// Radiance of the environment; 0 without one.
@@ -288,7 +299,7 @@ impl Lights {
         u_position: Vec2,
         u_direction: Vec2,
     ) -> Option<Emission> {
-        let choice = self.choice.as_ref()?.sample(u_light);
+        let choice = self.choice.as_ref()?.sample_everywhere(u_light);
         let probability = choice.probability as f32;
         let light = choice.index as u32;
         match self.lights.get(choice.index)? {
@@ -350,8 +361,17 @@ impl Lights {
         })
     }
 
-    fn probability(&self, light: u32) -> f32 {
-        self.choice.as_ref().map_or(0.0, |choice| choice.probability(light as usize)) as f32
+    fn probability(&self, light: u32, from: Vec3) -> f32 {
+        let of = |choice: &LightChoice| choice.probability(light as usize, |lamp| self.sent(lamp, from));
+        self.choice.as_ref().map_or(0.0, of) as f32
+    }
+
+    /// Estimate of what a lamp sends to a place.
+    fn sent(&self, lamp: usize, from: Vec3) -> f32 {
+        match self.lights.get(lamp) {
+            Some(Light::Lamp(lamp)) => lamp.sent(from),
+            _ => 0.0,
+        }
     }
 
     fn power(&self, light: &Light) -> f32 {

@@ -1,3 +1,4 @@
+use super::distribution::Discrete;
 use super::*;
 use coshade_scene::light::{Rectangle, Spot};
 use coshade_scene::{Light as Described, LightKind};
@@ -135,7 +136,8 @@ fn a_lamp_on_a_wall_shines_into_the_room() {
             let mut sampler = crate::random::Sampler::of_sequence(index, 8);
             let local = sample_cosine_hemisphere(sampler.next_2d()) + Vec3::Z * 0.1;
             let from = pose.resolve(|_| None).unwrap().transform_point(local);
-            if let Some(sample) = lights.sample(accel.geometry(), from, 0.5, sampler.next_2d()) {
+            let (u_light, u2) = (sampler.next_1d(), sampler.next_2d());
+            if let Some(sample) = lights.sample(accel.geometry(), from, u_light, u2) {
                 assert!(
                     !accel.occluded(&sample.shadow_ray(from, 0), Sees::Everything),
                     "{distance_m} m away"
@@ -146,5 +148,28 @@ fn a_lamp_on_a_wall_shines_into_the_room() {
             let ray = Ray::new(photon.origin, photon.direction, 0);
             assert!(!accel.occluded(&ray, Sees::Everything), "{distance_m} m away");
         }
+    }
+}
+
+/// Of 64 points of a (0, 2)-sequence, each of two equal lamps gets 32, one in each of 4 × 8 parts of its area.
+#[test]
+fn points_on_each_of_several_lamps_are_stratified() {
+    let lamp = || Described {
+        kind: LightKind::Rectangle(coshade_scene::light::Rectangle {
+            size_m: Vec2::ONE,
+            radiance: Vec3::ONE,
+        }),
+        ..disc_light(1.0)
+    };
+    let all = lights(vec![lamp(), lamp()], None).unwrap();
+    let mut seen = [[false; 32]; 2];
+    for index in 0..64 {
+        let pair = crate::random::Sampler::of_sequence(index, 5).next_2d();
+        // The number in the middle is not needed for two.
+        let sample = all.sample(&Geometry::default(), Vec3::Z, pair.x, Vec2::new(0.5, pair.y)).unwrap();
+        let place = sample.target.unwrap().truncate() + 0.5;
+        let part = (place.x * 4.0) as usize * 8 + (place.y * 8.0) as usize;
+        assert!(!seen[sample.light as usize][part], "{index}");
+        seen[sample.light as usize][part] = true;
     }
 }

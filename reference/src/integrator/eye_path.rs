@@ -66,11 +66,23 @@ impl<'scene> EyePath<'scene> {
         ray: &CameraRay,
         sampler: Sampler,
     ) -> Self {
+        Self::trace_in(Worlds::BOTH, scene, settings, photons, ray, sampler)
+    }
+
+    /// As [`EyePath::trace`], but looks into the given worlds only: the same light there, with less work.
+    pub fn trace_in(
+        worlds: Worlds,
+        scene: &'scene TraceScene,
+        settings: Settings,
+        photons: Option<&'scene PhotonMap>,
+        ray: &CameraRay,
+        sampler: Sampler,
+    ) -> Self {
         let mut path = Self { scene, settings, photons, radiance: Split::default(), first: None };
         let ray = Ray::new(ray.origin, ray.direction, 0);
         path.walk(
             Tip {
-                strand: Strand::new(ray, Vec3::ONE, Worlds::BOTH),
+                strand: Strand::new(ray, Vec3::ONE, worlds),
                 pdf: None,
                 from: ray.origin,
                 has_diffused: false,

@@ -1,5 +1,7 @@
 //! Light sampling: one way to one light, in both worlds, weighted against hitting the light by chance.
 
+use glam::Vec2;
+
 use super::eye_path::EyePath;
 use super::strand::{Arrival, Purpose, Strand};
 use crate::accel::Sees;
@@ -22,10 +24,10 @@ pub fn power_heuristic(own: f32, other: f32) -> f32 {
 impl EyePath<'_> {
     /// Adds what a light, drawn at random, sends to a vertex and on to the eye.
     pub(super) fn add_light_sample(&mut self, strand: &Strand, arrival: &Arrival, sampler: Sampler) {
-        let u_light = strand.sampler(sampler, Purpose::LightChoice).next_1d();
-        let u_point = strand.sampler(sampler, Purpose::LightPoint).next_2d();
+        let u_light = strand.sampler(sampler, Purpose::LightChoice).next_2d();
+        let u_point = Vec2::new(strand.sampler(sampler, Purpose::LightPoint).next_1d(), u_light.y);
         let geometry = self.scene.accel().geometry();
-        let Some(light) = self.scene.lights().sample(geometry, arrival.surface.position, u_light, u_point)
+        let Some(light) = self.scene.lights().sample(geometry, arrival.surface.position, u_light.x, u_point)
         else {
             return;
         };

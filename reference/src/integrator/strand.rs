@@ -24,9 +24,9 @@ const PAIRS: u32 = 8;
 pub enum Purpose {
     /// Alpha along the ray that leads to the vertex.
     Alpha,
-    /// Which light.
+    /// Which light, and where on it.
     LightChoice,
-    /// Where on it.
+    /// Where on one of very many.
     LightPoint,
     /// Alpha along the shadow ray.
     Shadow,

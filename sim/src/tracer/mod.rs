@@ -10,6 +10,7 @@ use nalgebra::Vector2;
 
 use crate::pose::Rigid;
 
+pub mod caustics;
 pub mod paths;
 pub mod room;
 

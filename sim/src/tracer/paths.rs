@@ -4,12 +4,16 @@ use std::sync::Arc;
 
 use coshade_reference::accel::{Ray, Sees};
 use coshade_reference::camera::CameraRay;
-use coshade_reference::integrator::{EyePath, Method, Settings, TraceScene};
-use coshade_reference::random::Sampler;
+use coshade_reference::differential::Worlds;
+use coshade_reference::integrator::{EyePath, Settings, TraceScene};
+use coshade_reference::photon::PhotonMap;
+use coshade_reference::random::{Sampler, hash_words};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::caustics::{self, Caustics};
 use super::{DepthSample, Tracer, View, ViewRay};
+use crate::pose::Rigid;
 
 /// How carefully pictures are traced.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -29,17 +33,19 @@ impl Default for TraceSpec {
     }
 }
 
-/// Traces paths through a scene, without photons: caustics of small lamps hardly converge.
+/// Traces paths through a scene; caustics of lamps by photons ([`Caustics`]).
 pub struct PathTracer {
     scene: Arc<TraceScene>,
     spec: TraceSpec,
+    caustics: Caustics,
     content: String,
 }
 
 impl PathTracer {
     /// `content` stands for the scene in [`Tracer::key`].
     pub fn new(scene: TraceScene, spec: TraceSpec, content: String) -> Self {
-        Self { scene: Arc::new(scene), spec, content }
+        let caustics = Caustics::new(&scene, spec.samples.max(1));
+        Self { scene: Arc::new(scene), spec, caustics, content }
     }
 
     /// What it traces.
@@ -48,21 +54,41 @@ impl PathTracer {
     }
 
     fn settings(&self) -> Settings {
-        Settings { max_depth: self.spec.max_depth, method: Method::Paths, ..Settings::default() }
+        Settings { max_depth: self.spec.max_depth, ..Settings::default() }
     }
+}
 
-    fn sample(&self, view: &View<'_>, pixel: [u32; 2], sample: u32) -> [f32; 3] {
-        let mut sampler = Sampler::new(pixel, sample, 0);
-        let place = sampler.next_2d();
+/// What the samples of a view have in common.
+struct Samples<'a> {
+    scene: &'a TraceScene,
+    settings: Settings,
+    maps: &'a [PhotonMap],
+    view: &'a View<'a>,
+    worlds: Worlds,
+    seed: u32,
+}
+
+impl Samples<'_> {
+    fn radiance(&self, pixel: [u32; 2], sample: u32) -> [f32; 3] {
+        let sampler = Sampler::new(pixel, sample, self.seed);
+        let place = sampler.clone().next_2d();
         let at = |axis: usize| f64::from(pixel[axis]) + f64::from(place[axis]) - 0.5;
-        let Some(ray) = view.ray(at(0), at(1)) else { return [0.0; 3] };
-        let path = EyePath::trace(&self.scene, self.settings(), None, &camera_ray(&ray), sampler);
-        match view.sees {
-            Sees::RealOnly => path.radiance.real(),
-            Sees::Everything => path.radiance.mixed(),
-        }
-        .to_array()
+        let Some(ray) = self.view.ray(at(0), at(1)) else { return [0.0; 3] };
+        let photons = caustics::of_sample(self.maps, sample);
+        let ray = camera_ray(&ray);
+        let path = EyePath::trace_in(self.worlds, self.scene, self.settings, photons, &ray, sampler);
+        let radiance = if self.worlds.in_real { path.radiance.real() } else { path.radiance.mixed() };
+        radiance.to_array()
     }
+}
+
+/// A seed for the pictures from a place: with one seed for all, the noise would stand still before a moving camera, like
+/// dirt on the lens.
+fn seed_of(pose: &Rigid) -> u32 {
+    let numbers = pose.rotation.to_array().into_iter().chain(pose.position_m.to_array());
+    let words: Vec<u32> =
+        numbers.map(f64::to_bits).flat_map(|bits| [bits as u32, (bits >> 32) as u32]).collect();
+    hash_words(&words)
 }
 
 fn camera_ray(ray: &ViewRay) -> CameraRay {
@@ -75,13 +101,26 @@ fn camera_ray(ray: &ViewRay) -> CameraRay {
 
 impl Tracer for PathTracer {
     fn radiance(&self, view: &View<'_>) -> Vec<[f32; 3]> {
+        let settings = self.settings();
+        let samples = Samples {
+            scene: &self.scene,
+            settings,
+            maps: self.caustics.maps(&self.scene, &settings),
+            view,
+            worlds: match view.sees {
+                Sees::RealOnly => Worlds::REAL,
+                Sees::Everything => Worlds::MIXED,
+            },
+            seed: seed_of(&view.world_from_camera),
+        };
+        let count = self.spec.samples.max(1);
         view.each_pixel(|x, y| {
             let mut sum = [0.0_f64; 3];
-            for sample in 0..self.spec.samples.max(1) {
-                let radiance = self.sample(view, [x, y], sample);
+            for sample in 0..count {
+                let radiance = samples.radiance([x, y], sample);
                 sum.iter_mut().zip(radiance).for_each(|(sum, part)| *sum += f64::from(part));
             }
-            sum.map(|sum| (sum / f64::from(self.spec.samples.max(1))) as f32)
+            sum.map(|sum| (sum / f64::from(count)) as f32)
         })
     }
 
@@ -100,6 +139,7 @@ impl Tracer for PathTracer {
     }
 
     fn key(&self) -> String {
-        format!("paths {:?} {}", self.spec, self.content)
+        // The number changes whenever pictures of the same world would.
+        format!("paths and photons 1 {:?} {}", self.spec, self.content)
     }
 }
