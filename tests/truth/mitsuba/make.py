@@ -128,9 +128,9 @@ def make(name, work):
     picture.write_exr(folder / "truth.exr", {
         "mixed": ("RGB", estimates["mixed"].mean),
         "difference": ("RGB", estimates["difference"].mean),
-        "difference_error": ("RGB", picture.rounded(estimates["difference"].error)),
+        "difference_error": ("RGB", picture.rounded_error(estimates["difference"].error)),
         "coverage": ("Y", layers["coverage"]),
-        "depth_z_m": ("Z", mean_depth(layers, case.camera)),
+        "depth_z_m": ("Z", picture.rounded_depth(mean_depth(layers, case.camera))),
         "normal": ("XYZ", layers["normal"]),
         "albedo": ("RGB", layers["albedo"]),
     })

@@ -4,8 +4,9 @@ import cv2
 import numpy as np
 import OpenEXR
 
-# Half floats of metres have steps of half a millimetre at 1 m.
+# Half floats of metres have steps of half a millimetre at 1 m: 32-bit floats, to 1/131072 m so that they can be compressed.
 FULL_PRECISION = {"depth_z_m"}
+DEPTH_STEPS_PER_M = 2 ** 17
 
 
 def write_exr(path, layers):
@@ -31,10 +32,14 @@ def read_exr(path, layer, names):
                         axis=-1).astype(np.float64)
 
 
-def rounded(values):
-    """To 3 binary digits, upwards: standard errors are not known any better, and files become smaller."""
+def rounded_error(values):
+    """To 2 binary digits, upwards: standard errors are not known any better, and files become smaller."""
     mantissa, exponent = np.frexp(values)
-    return np.ldexp(np.ceil(mantissa * 8) / 8, exponent)
+    return np.ldexp(np.ceil(mantissa * 4) / 4, exponent)
+
+
+def rounded_depth(depth_m):
+    return np.round(depth_m * DEPTH_STEPS_PER_M) / DEPTH_STEPS_PER_M
 
 
 def write_depth(path, depth_m, unit_m):
