@@ -110,9 +110,15 @@ impl TruthCase {
         self.root_mean_square(pairs.map(|(image, truth)| clipped(*image) - clipped(*truth)), set)
     }
 
-    /// What the truth itself is not sure of: [`TruthCase::difference_error`], root mean square over a set.
+    /// What the truth itself is not sure of: [`TruthCase::difference_error`], root mean square over a set. Radiance that is
+    /// surely above [`CLIP`] has no say: whatever it is, it is clipped.
     pub fn standard_error(&self, set: PixelSet) -> f64 {
-        self.root_mean_square(self.difference_error.iter().copied(), set)
+        const SURELY: f32 = 3.0;
+        let errors = self.difference_error.iter().zip(&self.mixed).map(|(error, mixed)| {
+            let counts = (*mixed - *error * SURELY).cmplt(Vec3::splat(CLIP));
+            Vec3::select(counts, *error, Vec3::ZERO)
+        });
+        self.root_mean_square(errors, set)
     }
 
     /// Pixels of a set.
