@@ -1,5 +1,7 @@
 //! The path tracer as the eye of sensors: caustics, repeatability, noise.
 
+#![expect(clippy::unwrap_used, reason = "clippy knows only functions marked as tests as tests")]
+
 use std::f32::consts::TAU;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -74,11 +76,7 @@ fn view<'a>(calibration: &'a Calibration, pose: &Similarity) -> View<'a> {
 }
 
 fn tracer(scene: &Scene, samples: u32) -> PathTracer {
-    PathTracer::new(
-        traced(scene),
-        TraceSpec { samples, max_depth: 12, ..TraceSpec::default() },
-        String::new(),
-    )
+    PathTracer::new(traced(scene), TraceSpec { samples, max_depth: 12 }, String::new())
 }
 
 /// Mean and standard error.
@@ -96,7 +94,7 @@ fn mean_green(picture: &[[f32; 3]]) -> f64 {
 /// By eye paths alone, which hit this large lamp by chance: mean of the green channel and its standard error.
 fn by_eye_paths(calibration: &Calibration, pose: Similarity, classes: Classes) -> (f64, f64) {
     let settings = Settings { method: Method::Paths, max_depth: 12, classes, ..Settings::default() };
-    let camera = Camera::new(calibration.model.clone(), [8, 8], pose).unwrap();
+    let camera = Camera::new(calibration.model, [8, 8], pose).unwrap();
     let scene = traced(&scene(Material::glass(1.5), 0.0));
     let options = JobOptions { samples: 4096, settings, ..JobOptions::default() };
     let film = render(&scene, &camera, &options, |_| {}, &AtomicBool::new(false)).unwrap();
@@ -178,7 +176,7 @@ fn tracing_both_worlds_or_one_is_the_same() {
     let mut differ = 0;
     for index in 0..500 {
         let at = Sampler::of_sequence(index, 1).next_2d() * 1.2 - 0.6;
-        let direction = (at.extend(0.0) - EYE).normalize();
+        let direction = (at.extend(0.0) - EYE).normalize_or_zero();
         let ray = CameraRay { origin: EYE, direction, depth_per_m: 1.0 };
         let trace = |worlds| {
             let sampler = Sampler::new([0, 0], index, 7);

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use coshade_capture::recording::{RecordingOptions, StreamCounts};
+use coshade_capture::recording::{Compression, RecordingOptions, StreamCounts};
 use coshade_sim::cache::PictureCache;
 use coshade_sim::recording::Recording;
 use coshade_sim::world::World;
@@ -53,7 +53,12 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let stop = interrupt::on_ctrl_c()?;
     let bar = ProgressBar::new(0);
     bar.set_style(ProgressStyle::with_template("simulating {elapsed} {wide_bar} {pos} of {len} frames")?);
-    let options = RecordingOptions { overwrite: args.overwrite, ..RecordingOptions::default() };
+    // Nothing waits for the disk: rather a small file.
+    let options = RecordingOptions {
+        overwrite: args.overwrite,
+        compression: Compression::Zstd,
+        ..RecordingOptions::default()
+    };
     let simulated = Recording { world: &world, tracer, cache }.write(&args.output, options, |progress| {
         bar.set_length(progress.total);
         bar.set_position(progress.done);

@@ -155,10 +155,7 @@ fn a_lamp_on_a_wall_shines_into_the_room() {
 #[test]
 fn points_on_each_of_several_lamps_are_stratified() {
     let lamp = || Described {
-        kind: LightKind::Rectangle(coshade_scene::light::Rectangle {
-            size_m: Vec2::ONE,
-            radiance: Vec3::ONE,
-        }),
+        kind: LightKind::Rectangle(Rectangle { size_m: Vec2::ONE, radiance: Vec3::ONE }),
         ..disc_light(1.0)
     };
     let all = lights(vec![lamp(), lamp()], None).unwrap();

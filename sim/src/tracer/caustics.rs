@@ -9,11 +9,14 @@ use rayon::prelude::*;
 
 /// At most so many maps: they and the radii make what is left of noise and blur in a caustic.
 const MOST_MAPS: u32 = 64;
-/// Photons that start for a map. Those kept are far fewer, for few meet anything specular; even if all did, a map would
-/// take 4.5 MB and all maps 290 MB for each specular bounce that ends on a duller surface.
-const PHOTONS: u32 = 1 << 16;
+/// About so many photons are to be kept in a map. One takes some 70 bytes: 2.3 MB a map, 150 MB for all.
+const WANTED: u32 = 1 << 15;
+/// No more start for a map, however few meet anything specular.
+const MOST_PHOTONS: u32 = 1 << 18;
+/// These start first, to see how many of them would be kept.
+const PILOTS: u32 = 1 << 12;
 /// Radius of the first map by that of the scene.
-const RADIUS_SHARE: f32 = 1.0 / 400.0;
+const RADIUS_SHARE: f32 = 1.0 / 300.0;
 
 /// Photon maps for the samples of a pixel.
 ///
@@ -48,13 +51,21 @@ pub fn of_sample(maps: &[PhotonMap], sample: u32) -> Option<&PhotonMap> {
 fn trace(scene: &TraceScene, settings: &Settings, count: u32) -> Vec<PhotonMap> {
     let radius = RadiusSchedule::new(scene.radius_m() * RADIUS_SHARE);
     let stop = AtomicBool::new(false);
+    let photons =
+        |count, pass| trace_photons(scene, settings, PhotonPaths::Caustics, count, [0, pass], &stop);
+    // A pass that no map has.
+    let kept = photons(PILOTS, MOST_MAPS).map_or(0, |kept| kept.len());
+    let started = started(kept);
     (0..count)
         .into_par_iter()
-        .filter_map(|pass| {
-            let photons = trace_photons(scene, settings, PhotonPaths::Caustics, PHOTONS, [0, pass], &stop)?;
-            Some(PhotonMap::new(&photons, radius.radius_m(pass)))
-        })
+        .filter_map(|pass| Some(PhotonMap::new(&photons(started, pass)?, radius.radius_m(pass))))
         .collect()
+}
+
+/// How many photons must start for a map, if `kept` of the pilots would be kept.
+fn started(kept: usize) -> u32 {
+    let wanted = u64::from(WANTED) * u64::from(PILOTS) / (kept as u64).max(1);
+    wanted.clamp(u64::from(PILOTS), u64::from(MOST_PHOTONS)) as u32
 }
 
 /// Runs `work` on threads of its own while the caller waits: a thread of the common pool would meanwhile take up other
@@ -114,5 +125,12 @@ mod tests {
             assert!(of_sample(maps, 7).is_some() == (count > 0));
         }
         assert_eq!(Caustics::new(&scene(mirror(), true), 1000).count, MOST_MAPS);
+    }
+
+    #[test]
+    fn photons_are_bounded() {
+        assert_eq!(started(0), MOST_PHOTONS);
+        assert_eq!(started(PILOTS as usize / 2), 2 * WANTED);
+        assert_eq!(started(usize::MAX), PILOTS);
     }
 }

@@ -140,6 +140,6 @@ impl Tracer for PathTracer {
 
     fn key(&self) -> String {
         // The number changes whenever pictures of the same world would.
-        format!("paths and photons 1 {:?} {}", self.spec, self.content)
+        format!("paths and photons 2 {:?} {}", self.spec, self.content)
     }
 }
