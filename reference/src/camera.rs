@@ -1,7 +1,9 @@
 //! Where the rays of a picture start and go.
 
+use coshade_lens::calibration::Calibration;
 use coshade_lens::model::{CameraModel, ModelKind};
-use coshade_lens::raster::MAX_SIDE_PX;
+use coshade_lens::pixel::CameraPx;
+use coshade_lens::raster::{ImageCircle, MAX_SIDE_PX};
 use coshade_scene::Similarity;
 use glam::{Quat, Vec2, Vec3};
 use nalgebra::Vector2;
@@ -25,6 +27,7 @@ pub enum CameraError {
 pub struct Camera {
     model: CameraModel,
     size_px: [u32; 2],
+    circle: ImageCircle,
     world_from_camera: Similarity,
 }
 
@@ -56,7 +59,19 @@ impl Camera {
         if !world_from_camera.is_valid() || (world_from_camera.scale - 1.0).abs() > 1e-4 {
             return Err(CameraError::Pose(world_from_camera.scale));
         }
-        Ok(Self { model, size_px, world_from_camera })
+        Ok(Self { model, size_px, circle: ImageCircle::default(), world_from_camera })
+    }
+
+    /// Lens, image size and image circle of a calibration, at a place.
+    ///
+    /// # Errors
+    /// As [`Camera::new`].
+    pub fn of_calibration(
+        calibration: &Calibration,
+        world_from_camera: Similarity,
+    ) -> Result<Self, CameraError> {
+        let camera = Self::new(calibration.model, calibration.size_px, world_from_camera)?;
+        Ok(Self { circle: calibration.image_circle.unwrap_or_default(), ..camera })
     }
 
     /// `world_from_camera` of a camera at `eye` that looks at `target`, with `up` upwards in its image. Any other upright
@@ -94,11 +109,15 @@ impl Camera {
     }
 
     /// The ray through a place of a pixel's square, `place` in [0, 1)² from its upper left corner; `None` where the lens
-    /// sees nothing.
+    /// sees nothing and outside the image circle.
     pub fn ray(&self, pixel: [u32; 2], place: Vec2) -> Option<CameraRay> {
         // Pixel centres are at whole numbers.
         let at = |axis: usize| f64::from(pixel[axis]) + f64::from(place[axis]) - 0.5;
-        let ray = self.model.unproject(&Vector2::new(at(0), at(1)))?;
+        let position = Vector2::new(at(0), at(1));
+        let ray = self.model.unproject(&position)?;
+        if !self.circle.contains(CameraPx(position), ray.x.hypot(ray.y).atan2(ray.z)) {
+            return None;
+        }
         let local = Vec3::new(ray.x as f32, ray.y as f32, ray.z as f32);
         Some(CameraRay {
             origin: self.world_from_camera.translation_m,
@@ -147,6 +166,18 @@ mod tests {
         // r = f θ: 50 px are 5 rad, beyond the whole sphere.
         assert!(camera.ray([0, 50], Vec2::splat(0.5)).is_none());
         assert!(camera.ray([65, 50], Vec2::splat(0.5)).is_some_and(|ray| ray.depth_per_m == 1.0));
+    }
+
+    #[test]
+    fn nothing_is_seen_outside_the_image_circle() {
+        let mut calibration = Calibration::default_for([101, 101], 186f64.to_radians()).unwrap();
+        let sees = |calibration: &Calibration, x: u32| {
+            let camera = Camera::of_calibration(calibration, Similarity::IDENTITY).unwrap();
+            camera.ray([x, 50], Vec2::splat(0.5)).is_some()
+        };
+        assert!(sees(&calibration, 0) && sees(&calibration, 50));
+        calibration.image_circle = Some(ImageCircle { max_angle_deg: Some(80.0), ..ImageCircle::default() });
+        assert!(!sees(&calibration, 0) && sees(&calibration, 50) && !sees(&calibration, 100));
     }
 
     #[test]

@@ -157,7 +157,7 @@ fn traced(case: &str, samples: u32) -> Film {
     let sensor = world.sensor("camera", tracer.clone()).unwrap();
     let pose = sensor.world_from_sensor(0.0).similarity();
     let calibration = sensor.calibration();
-    let camera = Camera::new(calibration.model, calibration.size_px, pose).unwrap();
+    let camera = Camera::of_calibration(calibration, pose).unwrap();
     let max_depth = world.spec().trace.max_depth;
     let options = JobOptions {
         samples,

@@ -49,9 +49,9 @@ pub struct Args {
     /// End when the noise of the difference is at most this share of the difference (root mean squares)
     #[arg(long, value_name = "SHARE")]
     error: Option<f64>,
-    /// Most scattering events of a path; 1 = direct light
-    #[arg(long, default_value_t = Settings::default().max_depth)]
-    max_depth: u32,
+    /// Most scattering events of a path; 1 = direct light. Left out: what the world file says under [trace], else 64
+    #[arg(long, value_name = "EVENTS")]
+    max_depth: Option<u32>,
     /// Another seed is an independent picture
     #[arg(long, default_value_t = 0)]
     seed: u32,
@@ -138,12 +138,16 @@ fn merged(shards: &[PathBuf]) -> anyhow::Result<Film> {
 }
 
 fn trace(name: &str, args: &Args) -> anyhow::Result<Film> {
-    let Traced { scene, camera } = Traced::read(name, args.frame)?;
+    let Traced { scene, camera, max_depth } = Traced::read(name, args.frame)?;
+    let default = Settings::default();
     let options = JobOptions {
         samples: args.samples,
         time_limit: args.seconds,
         error_limit: args.error,
-        settings: Settings { max_depth: args.max_depth, ..Settings::default() },
+        settings: Settings {
+            max_depth: args.max_depth.or(max_depth).unwrap_or(default.max_depth),
+            ..default
+        },
         seed: args.seed,
         shard: args.shard,
         threads: args.threads,

@@ -20,6 +20,8 @@ pub struct Traced {
     pub scene: Arc<TraceScene>,
     /// From where it is seen.
     pub camera: Camera,
+    /// Most scattering events, if the file says.
+    pub max_depth: Option<u32>,
 }
 
 impl Traced {
@@ -68,8 +70,8 @@ impl Traced {
             );
         }
         let pose = sensor.world_from_sensor(sensor.timing().time_s(frame)).similarity();
-        let Calibration { model, size_px, .. } = calibration;
-        Ok(Self { camera: Camera::new(model, size_px, pose)?, scene })
+        let max_depth = Some(world.spec().trace.max_depth);
+        Ok(Self { camera: Camera::of_calibration(&calibration, pose)?, scene, max_depth })
     }
 
     fn of_session(path: &Path) -> anyhow::Result<Self> {
@@ -77,7 +79,7 @@ impl Traced {
         let assembled = assembled(&session)?;
         let scene = TraceScene::build(&assembled, environment(&session)?, |_| None)
             .with_context(|| path.display().to_string())?;
-        Ok(Self { scene: Arc::new(scene), camera: camera(&session)? })
+        Ok(Self { scene: Arc::new(scene), camera: camera(&session)?, max_depth: None })
     }
 }
 
@@ -112,9 +114,9 @@ pub fn camera(session: &Session) -> anyhow::Result<Camera> {
     let calibration = spec.calibration.as_ref().ok_or_else(|| {
         anyhow!("{}: the camera has no lens: write [camera] calibration = \"camera.toml\"", path.display())
     })?;
-    let Calibration { model, size_px, .. } = Calibration::read(session.resolve(calibration))?;
+    let calibration = Calibration::read(session.resolve(calibration))?;
     let world_from_camera = *session.pose(pose)?.frame_from_thing();
-    Ok(Camera::new(model, size_px, world_from_camera)?)
+    Ok(Camera::of_calibration(&calibration, world_from_camera)?)
 }
 
 /// The environment of a session, `None` if it names none.

@@ -6,8 +6,6 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::Context as _;
 use coshade_image_file::{Image, LayeredImage, Precision, write_exr};
-use coshade_lens::calibration::Calibration;
-use coshade_lens::pixel::CameraPx;
 use coshade_reference::accel::Sees;
 use coshade_reference::camera::Camera;
 use coshade_reference::film::Film;
@@ -18,7 +16,6 @@ use coshade_sim::world::World;
 use glam::Vec3;
 use image::{ImageBuffer, Luma};
 use indicatif::ProgressBar;
-use nalgebra::Vector2;
 
 /// Of depth.png: fine enough for the depth of a clean case, and reaches 6.5 m.
 const DEPTH_UNIT_M: f32 = 1e-4;
@@ -42,13 +39,12 @@ pub fn trace(folder: &Path) -> anyhow::Result<()> {
 
     let film = self::film(&world, tracer.scene(), &fisheye, FISHEYE_SHARE)?;
     let real: Vec<Vec3> = film.pixels.iter().map(|pixel| pixel.real).collect();
-    write_picture(&folder.join("fisheye.exr"), &fisheye, &within_circle(fisheye.calibration(), real))?;
+    write_picture(&folder.join("fisheye.exr"), &fisheye, &real)?;
 
     write_depth(&folder.join("depth.png"), &depth)
 }
 
 fn film(world: &World, scene: &TraceScene, sensor: &SimSensor, share: u32) -> anyhow::Result<Film> {
-    let Calibration { model, size_px, .. } = sensor.calibration().clone();
     let pose = sensor.world_from_sensor(sensor.timing().time_s(0)).similarity();
     let trace = world.spec().trace;
     let options = JobOptions {
@@ -59,7 +55,7 @@ fn film(world: &World, scene: &TraceScene, sensor: &SimSensor, share: u32) -> an
         ..JobOptions::default()
     };
     let bar = ProgressBar::new(u64::from(options.samples));
-    let camera = Camera::new(model, size_px, pose)?;
+    let camera = Camera::of_calibration(sensor.calibration(), pose)?;
     let film = render(
         scene,
         &camera,
@@ -89,21 +85,6 @@ fn write_picture(path: &Path, sensor: &SimSensor, radiance: &[Vec3]) -> anyhow::
     let [width, height] = sensor.calibration().size_px.map(|side| side as usize);
     let file = LayeredImage::single(Image::from_rgb(width, height, radiance)?);
     Ok(write_exr(path, &file, Precision::Half)?)
-}
-
-/// Black where the lens casts no image.
-fn within_circle(calibration: &Calibration, radiance: Vec<Vec3>) -> Vec<Vec3> {
-    let circle = calibration.image_circle.unwrap_or_default();
-    let width = calibration.size_px[0] as usize;
-    let sees = |index: usize| {
-        let position = Vector2::new((index % width) as f64, (index / width) as f64);
-        calibration
-            .model
-            .unproject(&position)
-            .is_some_and(|ray| circle.contains(CameraPx(position), ray.x.hypot(ray.y).atan2(ray.z)))
-    };
-    let pixels = radiance.into_iter().enumerate();
-    pixels.map(|(index, radiance)| if sees(index) { radiance } else { Vec3::ZERO }).collect()
 }
 
 fn write_depth(path: &Path, sensor: &SimSensor) -> anyhow::Result<()> {
