@@ -110,7 +110,7 @@ fn caustics_are_those_of_eye_paths() {
     let means: Vec<f64> = (0..TURNS)
         .map(|turn| {
             let scene = scene(Material::glass(1.5), TAU * turn as f32 / TURNS as f32);
-            mean_green(&tracer(&scene, 16).radiance(&view(&calibration, &pose)))
+            mean_green(&tracer(&scene, 4).radiance(&view(&calibration, &pose)))
         })
         .collect();
     let (found, error) = statistics(&means);
