@@ -109,6 +109,7 @@ impl Mesh {
     }
 
     /// Indices of the corners of a triangle, or `None` behind the last.
+    #[inline]
     pub fn triangle(&self, triangle: usize) -> Option<[u32; 3]> {
         let first = triangle.checked_mul(3)?;
         self.indices.get(first..first + 3)?.try_into().ok()

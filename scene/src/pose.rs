@@ -51,11 +51,13 @@ impl Similarity {
     }
 
     /// Maps a point.
+    #[inline]
     pub fn transform_point(&self, point: Vec3) -> Vec3 {
         self.rotation * (self.scale * point) + self.translation_m
     }
 
     /// Maps a direction or a normal: rotated only, so a unit vector stays one.
+    #[inline]
     pub fn transform_direction(&self, direction: Vec3) -> Vec3 {
         self.rotation * direction
     }

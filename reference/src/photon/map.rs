@@ -24,7 +24,9 @@ pub struct PhotonMap {
     radius_m: f32,
     cell_m: f32,
     /// Sorted by the hash of their cell.
-    photons: Vec<(IVec3, Photon)>,
+    photons: Vec<Photon>,
+    /// Theirs, once more: most photons are only found to be too far away, and these fit into a processor's cache.
+    positions: Vec<Vec3>,
     /// Where the photons of a hash begin; one more than there are hashes.
     begin: Vec<u32>,
 }
@@ -35,24 +37,20 @@ impl PhotonMap {
         // A ball then touches at most two cells along each axis.
         let cell_m = (2.0 * radius_m).max(f32::MIN_POSITIVE);
         let buckets = photons.len().next_power_of_two().max(1);
-        let mut keyed: Vec<(u32, IVec3, &Photon)> = photons
-            .iter()
-            .map(|photon| {
-                let cell = cell_of(photon.position, cell_m);
-                (hash(cell, buckets), cell, photon)
-            })
-            .collect();
+        let mut keyed: Vec<(u32, &Photon)> =
+            photons.iter().map(|photon| (hash(cell_of(photon.position, cell_m), buckets), photon)).collect();
         // Stable: the sum does not depend on anything but the photons' order.
-        keyed.sort_by_key(|(hash, ..)| *hash);
+        keyed.sort_by_key(|(hash, _)| *hash);
         let mut begin = vec![0; buckets + 1];
-        for (hash, ..) in &keyed {
+        for (hash, _) in &keyed {
             begin[*hash as usize + 1] += 1;
         }
         for bucket in 0..buckets {
             begin[bucket + 1] += begin[bucket];
         }
-        let photons = keyed.into_iter().map(|(_, cell, photon)| (cell, *photon)).collect();
-        Self { radius_m, cell_m, photons, begin }
+        let photons: Vec<Photon> = keyed.into_iter().map(|(_, photon)| *photon).collect();
+        let positions = photons.iter().map(|photon| photon.position).collect();
+        Self { radius_m, cell_m, photons, positions, begin }
     }
 
     /// How many photons there are.
@@ -99,11 +97,13 @@ impl PhotonMap {
             for y in low.y..=high.y {
                 for z in low.z..=high.z {
                     let cell = IVec3::new(x, y, z);
-                    for (home, photon) in self.photons.get(self.bucket(cell)).unwrap_or_default() {
-                        let near = photon.position.distance_squared(point) <= self.radius_m * self.radius_m;
+                    let bucket = self.bucket(cell);
+                    let positions = self.positions.get(bucket.clone()).unwrap_or_default();
+                    for (index, position) in bucket.zip(positions) {
+                        let near = position.distance_squared(point) <= self.radius_m * self.radius_m;
                         // Other cells may share the hash.
-                        if near && *home == cell {
-                            take(photon);
+                        if near && cell_of(*position, self.cell_m) == cell {
+                            self.photons.get(index).into_iter().for_each(&mut take);
                         }
                     }
                 }

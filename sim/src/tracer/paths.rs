@@ -1,5 +1,6 @@
 //! The path tracer as the eye of simulated sensors.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use coshade_reference::accel::{Ray, Sees};
@@ -8,12 +9,17 @@ use coshade_reference::differential::Worlds;
 use coshade_reference::integrator::{EyePath, Settings, TraceScene};
 use coshade_reference::photon::PhotonMap;
 use coshade_reference::random::{Sampler, hash_words};
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::caustics::{self, Caustics};
 use super::{DepthSample, Tracer, View, ViewRay};
 use crate::pose::Rigid;
+
+/// Rows that are traced together. More: fewer threads at once. Fewer: a photon map is no sooner in the cache than the next one
+/// is wanted.
+const BAND_ROWS: u32 = 16;
 
 /// How carefully pictures are traced.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -69,6 +75,24 @@ struct Samples<'a> {
 }
 
 impl Samples<'_> {
+    /// Sums of the samples of some rows. All samples of one photon map are taken together: one map fits into a processor's
+    /// cache, all of them do not, and what the second bounce needs of it may be anywhere.
+    fn band(&self, rows: Range<u32>, count: u32) -> Vec<[f64; 3]> {
+        let width = self.view.width_px();
+        let pixels = || rows.clone().flat_map(|y| (0..width).map(move |x| [x, y]));
+        let mut sums = vec![[0.0; 3]; rows.len() * width as usize];
+        let maps = self.maps.len().max(1);
+        for first in 0..count.min(maps as u32) {
+            for (sum, pixel) in sums.iter_mut().zip(pixels()) {
+                for sample in (first..count).step_by(maps) {
+                    let radiance = self.radiance(pixel, sample);
+                    sum.iter_mut().zip(radiance).for_each(|(sum, part)| *sum += f64::from(part));
+                }
+            }
+        }
+        sums
+    }
+
     fn radiance(&self, pixel: [u32; 2], sample: u32) -> [f32; 3] {
         let sampler = Sampler::new(pixel, sample, self.seed);
         let place = sampler.clone().next_2d();
@@ -114,14 +138,9 @@ impl Tracer for PathTracer {
             seed: seed_of(&view.world_from_camera),
         };
         let count = self.spec.samples.max(1);
-        view.each_pixel(|x, y| {
-            let mut sum = [0.0_f64; 3];
-            for sample in 0..count {
-                let radiance = samples.radiance([x, y], sample);
-                sum.iter_mut().zip(radiance).for_each(|(sum, part)| *sum += f64::from(part));
-            }
-            sum.map(|sum| (sum / f64::from(count)) as f32)
-        })
+        let bands = view.rows.clone().into_par_iter().step_by(BAND_ROWS as usize);
+        let band = |top: u32| samples.band(top..(top + BAND_ROWS).min(view.rows.end), count);
+        bands.flat_map_iter(band).map(|sum| sum.map(|sum| (sum / f64::from(count)) as f32)).collect()
     }
 
     fn depth(&self, view: &View<'_>) -> Vec<DepthSample> {
@@ -140,6 +159,6 @@ impl Tracer for PathTracer {
 
     fn key(&self) -> String {
         // The number changes whenever pictures of the same world would.
-        format!("paths and photons 2 {:?} {}", self.spec, self.content)
+        format!("paths and photons 3 {:?} {}", self.spec, self.content)
     }
 }
