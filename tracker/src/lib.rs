@@ -5,11 +5,20 @@
 //! | [`family`] | the tag families |
 //! | [`bitmap`] | black and white cells of a tag |
 //! | [`board`] | the board file: tags printed on one sheet |
+//! | [`luma`] | the borrowed image that is looked at |
+//! | [`detection`] | tags found in an image |
+//! | [`body`] | tags that are fixed to each other |
 
 pub mod bitmap;
 pub mod board;
+pub mod body;
+pub mod detection;
 pub mod family;
+pub mod luma;
 
 pub use bitmap::{TagBitmap, TagError, tag_bitmap};
 pub use board::{Board, BoardTag};
+pub use body::{Body, BodyTag};
+pub use detection::{Detection, TagId, TagObservation, UNIT_CORNERS};
 pub use family::Family;
+pub use luma::{Luma, LumaError};
