@@ -14,6 +14,9 @@ pub struct TagBitmap {
     pub cells_between_corners: u32,
     /// `cells²` values.
     pub white: Vec<bool>,
+    /// `cells²` values: whether the family says what is in a cell. Elsewhere (in the middle of tagCustom48h12, outside of
+    /// the circle of round tags) anything may be printed.
+    pub known: Vec<bool>,
 }
 
 /// Why there is no such tag.
@@ -69,7 +72,37 @@ pub fn tag_bitmap(family: Family, id: u32) -> Result<TagBitmap, TagError> {
     let white = rows.flat_map(|row| row.iter().take(cells as usize).map(|byte| *byte != 0)).collect();
     // SAFETY: made by the library, not used any more.
     unsafe { c::image_u8_destroy(image) };
-    Ok(TagBitmap { cells, cells_between_corners, white })
+    let known = known_cells(table.get(), cells, cells_between_corners);
+    Ok(TagBitmap { cells, cells_between_corners, white, known })
+}
+
+/// The cells of the code, and the two rings on either side of the border.
+fn known_cells(table: &c::apriltag_family_t, cells: u32, cells_between_corners: u32) -> Vec<bool> {
+    let margin = (cells - cells_between_corners) / 2;
+    let last = cells.saturating_sub(1);
+    let ring = |column: u32, row: u32| column.min(row).min(last - column).min(last - row);
+    let mut known: Vec<bool> = (0..cells * cells)
+        .map(|cell| {
+            let inset = ring(cell % cells, cell / cells);
+            inset == margin || inset + 1 == margin
+        })
+        .collect();
+    let bits = table.nbits as usize;
+    // SAFETY: the library allocates `nbits` places along each axis, and the table outlives this function.
+    let (columns, rows) = unsafe {
+        (std::slice::from_raw_parts(table.bit_x, bits), std::slice::from_raw_parts(table.bit_y, bits))
+    };
+    for (column, row) in columns.iter().zip(rows) {
+        // Counted from the border, with negative numbers (outside of it) wrapped around.
+        let (column, row) = (column.wrapping_add(margin), row.wrapping_add(margin));
+        if column < cells
+            && row < cells
+            && let Some(known) = known.get_mut((row * cells + column) as usize)
+        {
+            *known = true;
+        }
+    }
+    known
 }
 
 #[cfg(test)]
@@ -105,6 +138,16 @@ mod tests {
             let last = family.tag_count();
             assert_eq!(tag_bitmap(family, last), Err(TagError::Id { family, id: last }));
         }
+    }
+
+    #[test]
+    fn what_may_be_anything_is_not_known() {
+        let unknown = |family| tag_bitmap(family, 1).unwrap().known.iter().filter(|known| !**known).count();
+        // All cells of the classic family are bits or border.
+        assert_eq!(unknown(Family::Tag36h11), 0);
+        // Four corners of 81 cells lie outside of a circle; the middle of the custom family holds 2 × 2 cells.
+        assert!(unknown(Family::Circle21h7) > 0);
+        assert_eq!(unknown(Family::Custom48h12), 4);
     }
 
     #[test]

@@ -15,6 +15,7 @@ pub mod body;
 pub mod detection;
 pub mod family;
 pub mod luma;
+pub mod refine;
 
 pub use bitmap::{TagBitmap, TagError, tag_bitmap};
 pub use board::{Board, BoardTag};
