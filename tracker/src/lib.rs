@@ -8,12 +8,14 @@
 //! | [`luma`] | the borrowed image that is looked at |
 //! | [`detection`] | tags found in an image |
 //! | [`body`] | tags that are fixed to each other |
+//! | [`lie`] | exponential and logarithm of rigid motions |
 
 pub mod bitmap;
 pub mod board;
 pub mod body;
 pub mod detection;
 pub mod family;
+pub mod lie;
 pub mod luma;
 pub mod refine;
 
