@@ -38,8 +38,6 @@ pub struct RefineSettings {
     pub max_pixels: usize,
     /// Most steps. Higher: also finds corners that were a cell off. Lower: bounds the time.
     pub max_iterations: u32,
-    /// Corners that move by less in a step are done, in px.
-    pub converged_px: f64,
     /// How much of the pixels' variance the tag must explain to count as seen, 0 to 1. Higher: surer. Lower: more of a
     /// tag may be covered.
     pub min_explained: f64,
@@ -49,17 +47,7 @@ pub struct RefineSettings {
 
 impl Default for RefineSettings {
     fn default() -> Self {
-        Self { max_pixels: 2500, max_iterations: 15, converged_px: 0.003, min_explained: 0.5, floor_px: 0.01 }
-    }
-}
-
-impl RefineSettings {
-    /// How far corners may move in all: a cell, or two pixels.
-    fn max_shift_px(&self, corners: &[Vector2<f64>; 4], cells: f64) -> f64 {
-        let [a, b, c, d] = corners;
-        let longest =
-            [(a, b), (b, c), (c, d), (d, a)].iter().map(|(a, b)| (*a - *b).norm()).fold(0.0, f64::max);
-        (1.0 * longest / cells).max(2.0)
+        Self { max_pixels: 3000, max_iterations: 12, min_explained: 0.5, floor_px: 0.01 }
     }
 }
 
@@ -115,6 +103,26 @@ pub enum RefineError {
     },
 }
 
+/// How far a fit is taken.
+struct Stage {
+    max_pixels: usize,
+    max_iterations: u32,
+    /// Corners that move by less in a step are done, in px. Gauss–Newton's next step would be a tenth of it or less.
+    converged_px: f64,
+}
+
+impl Stage {
+    fn coarse(settings: &RefineSettings) -> Self {
+        let RefineSettings { max_pixels, max_iterations, .. } = *settings;
+        Self { max_pixels: (max_pixels / 4).max(MIN_COARSE), max_iterations, converged_px: 0.1 }
+    }
+
+    fn fine(settings: &RefineSettings) -> Self {
+        let RefineSettings { max_pixels, max_iterations, .. } = *settings;
+        Self { max_pixels, max_iterations, converged_px: 0.02 }
+    }
+}
+
 /// A pixel to be explained.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
@@ -126,18 +134,22 @@ struct Sample {
     clipped: bool,
 }
 
+/// A coarse fit looks at so many pixels at least.
+const MIN_COARSE: usize = 600;
 /// Fewest pixels from which 16 unknowns are found with some to spare.
 const MIN_PIXELS: usize = 48;
 /// Blur that a fit starts with, in px.
 const START_BLUR_PX: f64 = 0.9;
 /// Distance from an edge between cells, in standard deviations of the blur, beyond which pixels say nothing of it.
-const EDGE_REACH: f64 = 2.5;
+const EDGE_REACH: f64 = 1.6;
 /// Largest share of a pixel's light that may come from where anything may be printed.
-const MAX_UNKNOWN: f64 = 0.25;
+const MAX_UNKNOWN: f64 = 0.02;
 /// How far that light may be from what is assumed of it, as a fraction of white minus black.
 const UNKNOWN_DEVIATION: f64 = 0.5;
+/// How much of a tag's pixels lies near edges, roughly.
+const EDGE_SHARE: f64 = 0.35;
 /// Of the pixels that say nothing of an edge, one in so many is kept: they say what is black and white.
-const FLAT_SHARE: u32 = 6;
+const FLAT_SHARE: u32 = 8;
 
 /// Refines corners in images of one camera.
 #[derive(Clone, Debug)]
@@ -181,15 +193,15 @@ impl Refiner {
         let chart = Chart::around(self.lens.as_ref(), corners_px).ok_or(RefineError::Corners(tag))?;
         let mut fit =
             Fit::start(template, &chart, corners_px, START_BLUR_PX).ok_or(RefineError::Corners(tag))?;
-        // Which pixels speak, and how loudly, depends on blur and noise, which the first fit finds.
-        for _ in 0..2 {
-            collect(&mut self.samples, image, &self.light, &chart, &fit, &self.settings)
+        // Which pixels speak, and how loudly, depends on blur and noise, which a first, coarse fit finds.
+        for stage in [Stage::coarse(&self.settings), Stage::fine(&self.settings)] {
+            collect(&mut self.samples, image, &self.light, &chart, &fit, stage.max_pixels)
                 .ok_or(RefineError::Corners(tag))?;
             let pixels = self.samples.len();
             if pixels < MIN_PIXELS {
                 return Err(RefineError::Small { tag, pixels });
             }
-            fit.run(&self.samples, &self.settings)?;
+            fit.run(&self.samples, &stage)?;
         }
         let pixels = self.samples.len();
         let Fitted { corners_px, covariance_px2, blur_px, contrast, residual, explained, iterations } =
@@ -210,20 +222,23 @@ fn collect(
     light: &LightOfCode,
     chart: &Chart,
     fit: &Fit,
-    settings: &RefineSettings,
+    max_pixels: usize,
 ) -> Option<()> {
     samples.clear();
     let template = fit.template();
     let unknown_variance = (UNKNOWN_DEVIATION * fit.contrast_to_noise()).powi(2);
     let [low, high] = bounds(chart, template, fit, image)?;
     let area = (high - low + Vector2::repeat(1.0)).product();
-    let step = (area / (2.0 * settings.max_pixels as f64)).sqrt().ceil().max(1.0) as u32;
+    let share = max_pixels as f64 / (EDGE_SHARE * area);
     let derivative = Derivative::new(chart, low, high)?;
     let (mut flat, [left, top, right, bottom]) =
         (0, [low.x as u32, low.y as u32, high.x as u32, high.y as u32]);
-    for y in (top..=bottom).step_by(step as usize) {
+    for y in top..=bottom {
         let row = image.row(y);
-        for x in (left..=right).step_by(step as usize) {
+        for x in left..=right {
+            if share < 1.0 && scattered(x, y) > share {
+                continue;
+            }
             let (Some(code), px) = (row.get(x as usize), Vector2::new(f64::from(x), f64::from(y))) else {
                 continue;
             };
@@ -236,9 +251,7 @@ fn collect(
             if unknown > MAX_UNKNOWN {
                 continue;
             }
-            let edge =
-                cell.zip_map(&sigma, |cell, sigma| (cell - cell.round()).abs() / sigma.max(1e-6)).min();
-            if edge > EDGE_REACH {
+            if !template.is_near_edge(cell, sigma * EDGE_REACH) {
                 flat += 1;
                 if flat % FLAT_SHARE != 0 {
                     continue;
@@ -255,6 +268,11 @@ fn collect(
         }
     }
     Some(())
+}
+
+/// A number in 0 to 1 for each pixel: those below any bound lie evenly spread (Roberts' R₂ sequence, as a lattice).
+fn scattered(x: u32, y: u32) -> f64 {
+    (f64::from(x) * 0.754_877_666 + f64::from(y) * 0.569_840_291).fract()
 }
 
 /// The rectangle of pixels around the tag and its outer ring, within the image.

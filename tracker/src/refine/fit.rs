@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2};
 
 use super::chart::{Chart, homography, is_front};
 use super::template::Template;
-use super::{RefineError, RefineSettings, Sample};
+use super::{RefineError, Sample, Stage};
 
 /// Unknowns: 8 of the homography, the logarithm of the blur, 7 of light.
 const UNKNOWNS: usize = 16;
@@ -113,6 +113,14 @@ impl<'a> Fit<'a> {
         self.template
     }
 
+    /// How far corners may be from where they were looked for: a cell, or two pixels.
+    fn reach_px(&self, corners: &[Vector2<f64>; 4]) -> f64 {
+        let [a, b, c, d] = corners;
+        let longest =
+            [(a, b), (b, c), (c, d), (d, a)].iter().map(|(a, b)| (*a - *b).norm()).fold(0.0, f64::max);
+        (longest / self.template.width()).max(2.0)
+    }
+
     pub(super) fn blur_px(&self) -> f64 {
         self.log_blur.exp()
     }
@@ -123,7 +131,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Fits to the samples.
-    pub(super) fn run(&mut self, samples: &[Sample], settings: &RefineSettings) -> Result<(), RefineError> {
+    pub(super) fn run(&mut self, samples: &[Sample], stage: &Stage) -> Result<(), RefineError> {
         let mut tolerated = TOLERATED;
         if self.noise.is_none() {
             self.start_light(samples).ok_or(RefineError::Flat)?;
@@ -132,7 +140,7 @@ impl<'a> Fit<'a> {
         let start = self.corners_px().ok_or(RefineError::Lost)?;
         let mut corners = start;
         let mut sums = self.sums(samples);
-        for _ in 0..settings.max_iterations {
+        for _ in 0..stage.max_iterations {
             self.iterations += 1;
             let contrast = self.light[3].abs();
             self.scale = (1.4826 * median(&mut sums.deviations)).max(tolerated * contrast).max(0.5);
@@ -146,12 +154,10 @@ impl<'a> Fit<'a> {
             let moved = self.corners_px().ok_or(RefineError::Lost)?;
             let shift = distance(&moved, &corners);
             corners = moved;
-            if !shift.is_finite()
-                || distance(&corners, &start) > settings.max_shift_px(&start, self.template.width())
-            {
+            if !shift.is_finite() || distance(&corners, &start) > self.reach_px(&start) {
                 return Err(RefineError::Lost);
             }
-            if shift < settings.converged_px && last {
+            if shift < stage.converged_px && last {
                 break;
             }
         }

@@ -41,6 +41,8 @@ pub(crate) struct Template {
     white: Vec<f64>,
     /// 1 where the tag says what is printed, 0 elsewhere and in a ring of cells around it, row by row.
     known: Vec<f64>,
+    /// Whether that is so in all of its cells.
+    all_known: bool,
 }
 
 /// The blurred tag at one place.
@@ -60,13 +62,14 @@ impl Template {
         let white = white.iter().map(|white| f64::from(u8::from(*white))).collect();
         let margin = 0.5 * f64::from(cells - cells_between_corners);
         let cells = cells as usize;
+        let all_known = known.iter().all(|known| *known);
         let mut ringed = vec![0.0; (cells + 2) * (cells + 2)];
         for (index, known) in known.into_iter().enumerate() {
             if let Some(cell) = ringed.get_mut((index / cells + 1) * (cells + 2) + index % cells + 1) {
                 *cell = f64::from(u8::from(known));
             }
         }
-        Ok(Self { cells, margin, white, known: ringed })
+        Ok(Self { cells, margin, white, known: ringed, all_known })
     }
 
     /// The corners in the order of [`crate::detection::UNIT_CORNERS`], as columns and rows of cells.
@@ -88,7 +91,26 @@ impl Template {
     /// How much of what a blur brings to a `place` comes from where anything may be printed: 0 nothing, 1 all. The blur's
     /// standard deviations are along columns and rows.
     pub(super) fn unknown(&self, place: Vector2<f64>, sigma: Vector2<f64>) -> f64 {
+        let deep =
+            |place: f64, sigma: f64| place > REACH * sigma && place < self.cells as f64 - REACH * sigma;
+        if self.all_known && deep(place.x, sigma.x) && deep(place.y, sigma.y) {
+            return 0.0;
+        }
         1.0 - blurred(&self.known, self.cells + 2, place + Vector2::repeat(1.0), sigma).value
+    }
+
+    /// Whether an edge between black and white is within `reach` of a place, along the rows or along the columns.
+    pub(super) fn is_near_edge(&self, place: Vector2<f64>, reach: Vector2<f64>) -> bool {
+        let differ = |a: [f64; 2], b: [f64; 2]| self.color(a) != self.color(b);
+        let (x, y) = (place.x, place.y);
+        (x - x.round()).abs() <= reach.x && differ([x.round() - 0.5, y], [x.round() + 0.5, y])
+            || (y - y.round()).abs() <= reach.y && differ([x, y.round() - 0.5], [x, y.round() + 0.5])
+    }
+
+    /// The colour of the cell at a place; beyond the tag, of the nearest cell.
+    fn color(&self, [x, y]: [f64; 2]) -> Option<&f64> {
+        let cell = |x: f64| (x.max(0.0) as usize).min(self.cells - 1);
+        self.white.get(cell(y) * self.cells + cell(x))
     }
 
     /// The tag at a `place` (column, row) under a blur of `covariance`, both in cells.
