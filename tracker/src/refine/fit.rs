@@ -227,6 +227,7 @@ impl<'a> Fit<'a> {
             weighted_square: 0.0,
             deviations: Vec::with_capacity(samples.len()),
         };
+        let mut normal = [[0.0; UNKNOWNS]; UNKNOWNS];
         let middle = 0.5 * self.template.side();
         for sample in samples {
             let Some((cell, by_place)) = self.cell(&sample.place) else { continue };
@@ -253,7 +254,7 @@ impl<'a> Fit<'a> {
             let w = 1.0 / (h.m31 * x + h.m32 * y + h.m33);
             let along = gradient.dot(&cell);
             let (gx, gy, gw) = (gradient.x * w, gradient.y * w, -along * w);
-            let row: Unknowns = [
+            let row = [
                 gx * x,
                 gx * y,
                 gx,
@@ -270,14 +271,13 @@ impl<'a> Fit<'a> {
                 light[4],
                 light[5],
                 light[6],
-            ]
-            .into();
-            accumulate(&mut sums.normal, &row, weight);
-            sums.gradient += row * (weight * deviation);
+            ];
+            accumulate(&mut normal, &row, weight);
+            sums.gradient += Unknowns::from(row) * (weight * deviation);
             sums.weight += weight;
             sums.weighted_square += weight * deviation * deviation;
         }
-        sums.normal.fill_lower_triangle_with_upper_triangle();
+        sums.normal = Normal::from(normal);
         sums
     }
 
@@ -367,14 +367,12 @@ fn limit(step: &Unknowns) -> f64 {
     (0.5 / step[BLUR].abs().max(1e-9)).min(1.0)
 }
 
-/// Upper triangle of `normal += weight · row rowᵀ`.
+/// `normal += weight · row rowᵀ`; plain arrays, all of it, so that it becomes vector code.
 #[inline]
-fn accumulate(normal: &mut Normal, row: &Unknowns, weight: f64) {
-    for column in 0..UNKNOWNS {
-        let factor = weight * row[column];
-        for i in 0..=column {
-            normal[(i, column)] += factor * row[i];
-        }
+fn accumulate(normal: &mut [[f64; UNKNOWNS]; UNKNOWNS], row: &[f64; UNKNOWNS], weight: f64) {
+    for (normal, entry) in normal.iter_mut().zip(row) {
+        let factor = weight * entry;
+        normal.iter_mut().zip(row).for_each(|(normal, entry)| *normal += factor * entry);
     }
 }
 

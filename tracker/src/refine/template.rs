@@ -10,8 +10,10 @@ use super::gaussian::normal;
 use crate::bitmap::{TagBitmap, TagError, tag_bitmap};
 use crate::detection::TagId;
 
-/// Most cells along the side of any family's bitmap, and room for the blur beyond.
-const MAX_CELLS: usize = 16;
+/// Widest blur that is evaluated, in cells: under a wider one a tag cannot be read.
+const MAX_SIGMA: f64 = 1.0;
+/// Most cells within its reach.
+const MAX_CELLS: usize = 8;
 /// How far the blur is followed, in standard deviations.
 const REACH: f64 = 3.5;
 /// Narrowest blur that is evaluated, in cells: below it, edges are steps to the precision needed.
@@ -140,75 +142,68 @@ impl Template {
 
 /// A square of `side`² cells at a place, under a blur along its rows and columns. The outermost cells go on for ever.
 fn blurred(cells: &[f64], side: usize, place: Vector2<f64>, sigma: Vector2<f64>) -> Shade {
-    let columns = Weights::new(place.x, sigma.x, side);
-    let rows = Weights::new(place.y, sigma.y, side);
+    let sigma = sigma.map(|sigma| sigma.clamp(MIN_SIGMA, MAX_SIGMA));
+    let mut columns = [CellShare::default(); MAX_CELLS];
+    let (first, mut count) = (first_cell(place.x, sigma.x, side), 0);
+    each_cell(place.x, sigma.x, side, |_, share| {
+        if let Some(column) = columns.get_mut(count) {
+            *column = share;
+            count += 1;
+        }
+    });
+    let columns = columns.get(..count).unwrap_or(&[]);
     let mut shade = Shade::default();
-    for row in rows.each() {
+    each_cell(place.y, sigma.y, side, |row, share| {
+        let start = row * side + first;
         let (mut value, mut by_x, mut by_sigma) = (0.0, 0.0, 0.0);
-        let cells = cells.get(row.cell * side..).unwrap_or(&[]);
-        for column in columns.each() {
-            let white = cells.get(column.cell).copied().unwrap_or(0.0);
-            value += white * column.weight;
+        for (white, column) in cells.get(start..start + count).unwrap_or(&[]).iter().zip(columns) {
+            value += white * column.share;
             by_x += white * column.by_place;
             by_sigma += white * column.by_log_sigma;
         }
-        shade.value += value * row.weight;
-        shade.gradient.x += by_x * row.weight;
-        shade.gradient.y += value * row.by_place;
-        shade.by_log_blur += by_sigma * row.weight + value * row.by_log_sigma;
-    }
+        shade.value += value * share.share;
+        shade.gradient.x += by_x * share.share;
+        shade.gradient.y += value * share.by_place;
+        shade.by_log_blur += by_sigma * share.share + value * share.by_log_sigma;
+    });
     shade
 }
 
-/// How much the cells of a row or column count at one place.
-struct Weights {
-    count: usize,
-    weights: [Weight; MAX_CELLS],
-}
-
+/// How much one cell of a row or column brings to a place, and its derivatives.
 #[derive(Clone, Copy, Default)]
-struct Weight {
-    cell: usize,
-    weight: f64,
+struct CellShare {
+    share: f64,
     by_place: f64,
     by_log_sigma: f64,
 }
 
-impl Weights {
-    fn new(place: f64, sigma: f64, cells: usize) -> Self {
-        let last = cells.min(MAX_CELLS).saturating_sub(1);
-        let cell = |x: f64| (x.max(0.0) as usize).min(last);
-        let first = cell(place - REACH * sigma);
-        let end = cell(place + REACH * sigma);
-        let mut weights = [Weight::default(); MAX_CELLS];
-        // At each boundary between cells: how much lies beyond it, and its derivatives.
-        let mut before = Weight { cell: 0, weight: 1.0, by_place: 0.0, by_log_sigma: 0.0 };
-        for (cell, weight) in (first..=end).zip(&mut weights) {
-            let after = match cell == end {
-                true => Weight::default(),
-                false => {
-                    let z = (place - (cell + 1) as f64) / sigma;
-                    let (distribution, density) = normal(z);
-                    Weight {
-                        cell: 0,
-                        weight: distribution,
-                        by_place: density / sigma,
-                        by_log_sigma: -z * density,
-                    }
-                }
-            };
-            *weight = Weight {
-                cell,
-                weight: before.weight - after.weight,
-                by_place: before.by_place - after.by_place,
-                by_log_sigma: before.by_log_sigma - after.by_log_sigma,
-            };
-            before = after;
-        }
-        Self { count: end - first + 1, weights }
-    }
+fn first_cell(place: f64, sigma: f64, side: usize) -> usize {
+    ((place - REACH * sigma).max(0.0) as usize).min(side - 1)
+}
 
-    fn each(&self) -> &[Weight] {
-        self.weights.get(..self.count).unwrap_or(&[])
+/// Calls `take` for the cells within reach of a place, in their order.
+#[inline(always)]
+fn each_cell(place: f64, sigma: f64, side: usize, mut take: impl FnMut(usize, CellShare)) {
+    let first = first_cell(place, sigma, side);
+    let last = ((place + REACH * sigma).max(0.0) as usize).min(side - 1);
+    let per_sigma = 1.0 / sigma;
+    // At each boundary between cells: how much lies beyond it.
+    let mut before = CellShare { share: 1.0, by_place: 0.0, by_log_sigma: 0.0 };
+    for cell in first..=last {
+        let after = match cell == last {
+            true => CellShare::default(),
+            false => {
+                let z = (place - (cell + 1) as f64) * per_sigma;
+                let (share, density) = normal(z);
+                CellShare { share, by_place: density * per_sigma, by_log_sigma: -z * density }
+            }
+        };
+        let share = CellShare {
+            share: before.share - after.share,
+            by_place: before.by_place - after.by_place,
+            by_log_sigma: before.by_log_sigma - after.by_log_sigma,
+        };
+        take(cell, share);
+        before = after;
     }
 }
