@@ -11,7 +11,7 @@ use std::path::Path;
 
 use coshade_config::{Problem, Severity};
 use coshade_scene::session::light::LightKindSpec;
-use coshade_scene::session::placement::PoseSpec;
+use coshade_scene::session::placement::{Placement, PoseSpec};
 use coshade_scene::session::render::{Method, RenderSpec};
 use coshade_scene::session::sensors::Mount;
 use coshade_scene::session::thing::{Form, ShapeKind};
@@ -367,11 +367,12 @@ fn materials_do_not_say_things_twice() {
 fn desk(folder: &Path) -> Session {
     let calibration = "version = 1\nsize_px = [640, 480]\n[lens]\nmodel = \"pinhole\"\nfx = 500\nfy = 500\ncx = 319.5\ncy = 239.5\n";
     let rig = "version = 1\n[sensor.camera]\n[sensor.fisheye]\nposition_m = [0, 0.1, 0]\n";
+    let board = "version = 1\nfamily = \"tag36h11\"\n[[tag]]\nid = 0\nsize_m = 0.04\nposition_m = [0, 0]\n";
     for (name, text) in [
         ("camera.toml", calibration),
         ("fisheye.toml", calibration),
         ("rig.toml", rig),
-        ("board.toml", ""),
+        ("board.toml", board),
         ("session.toml", EXAMPLE),
     ] {
         fs::write(folder.join(name), text).unwrap();
@@ -421,6 +422,28 @@ fn damaged_files_are_told_with_their_own_places() {
     let rig = problems.iter().find(|problem| problem.key == "rig").unwrap();
     assert!(rig.message.contains("rig.toml:3:1: error: sensor.camera.readout"), "{rig}");
     assert!(rig.message.contains("did you mean `readout_s`"), "{rig}");
+}
+
+#[test]
+fn damaged_boards_and_bodies_are_told_with_their_own_places() {
+    let folder = tempfile::tempdir().unwrap();
+    let session = desk(folder.path());
+    let cube =
+        "version = 1\nfamily = \"tag36h11\"\n[[tag]]\nid = 600\nsize_m = 0.04\nposition_m = [0, 0, 1]\n";
+    fs::write(folder.path().join("board.toml"), cube.replace("600", "6").replace("size_m", "size")).unwrap();
+    fs::write(folder.path().join("cube.toml"), cube).unwrap();
+    let mut spec = session.spec().clone();
+    let body = PoseSpec::Body { body: "cube.toml".into(), placement: Placement::default() };
+    spec.things[0].pose = body;
+    let session = Session::new(&spec, folder.path().join("session.toml")).unwrap();
+    let problems = session.check();
+    let told = |key: &str, what: &str| {
+        let problem = problems.iter().find(|problem| problem.key == key);
+        let problem = problem.unwrap_or_else(|| panic!("{key}: nothing is told")).to_string();
+        assert!(problem.contains(what), "{problem}");
+    };
+    told("tracking.anchor.board", "board.toml:5:1: error: tag[0].size: unknown key");
+    told("thing[0].pose.body", "cube.toml:4:6: error: tag[0].id: tag36h11 has no tag 600");
 }
 
 #[test]

@@ -33,6 +33,16 @@ impl Rigid {
     }
 }
 
+impl From<nalgebra::Isometry3<f64>> for Rigid {
+    fn from(a_from_b: nalgebra::Isometry3<f64>) -> Self {
+        let vector = a_from_b.translation.vector;
+        Self {
+            rotation: DQuat::from_array(a_from_b.rotation.coords.into()),
+            position_m: DVec3::new(vector.x, vector.y, vector.z),
+        }
+    }
+}
+
 impl std::ops::Mul for Rigid {
     type Output = Self;
 

@@ -97,6 +97,25 @@ fn things_on_tags_and_tags_on_boards_are_in_their_true_places() {
 }
 
 #[test]
+fn tags_of_a_cube_are_on_its_faces() {
+    let folder = tempfile::tempdir().unwrap();
+    let cube = "version = 1\nfamily = \"tag36h11\"\n[[tag]]\nid = 1\nsize_m = 0.08\nposition_m = [0.05, 0, 0]\n\
+                rotation_deg = [90, 0, 90]\n[[tag]]\nid = 0\nfamily = \"tag25h9\"\nsize_m = 0.06\n\
+                position_m = [0, 0, 0.05]\n";
+    std::fs::write(folder.path().join("board.toml"), cube).unwrap();
+    // The file puts its board at (-0.3, 0.2, 0), not turned.
+    let world = World::parse(DESK, folder.path().join("desk.toml")).unwrap();
+    let tags = world.tags().unwrap();
+    let (side, top) = (&tags[1], &tags[2]);
+    assert_eq!((side.family.as_str(), side.id, top.family.as_str(), top.id), ("tag36h11", 1, "tag25h9", 0));
+    // Seen from +x, the print's right is +y, its up is +z.
+    let lower_left = side.corners_m()[0] - glam::DVec3::new(-0.3, 0.2, 0.0);
+    assert!((lower_left - glam::DVec3::new(0.05, -0.04, -0.04)).length() < 1e-12, "{lower_left}");
+    let upper_right = top.corners_m()[2] - glam::DVec3::new(-0.3, 0.2, 0.0);
+    assert!((upper_right - glam::DVec3::new(0.03, 0.03, 0.05)).length() < 1e-12, "{upper_right}");
+}
+
+#[test]
 fn unknown_tags_boards_and_sensors_are_named() {
     let without_tag = DESK.replacen("id = 3\nsize_m = 0.08\npose", "id = 4\nsize_m = 0.08\npose", 1);
     let world = World::parse(&without_tag, desk_file()).unwrap();

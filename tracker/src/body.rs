@@ -1,8 +1,7 @@
 //! Tags that are fixed to each other.
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Point3};
 
-use crate::board::Board;
 use crate::detection::{TagId, UNIT_CORNERS};
 
 /// A rigid thing that carries tags: a board, a cube with tags on its faces, a single tag, or a mapped room.
@@ -37,22 +36,6 @@ impl Body {
     pub fn single(tag: TagId, size_m: f64) -> Self {
         let body_from_tag = Isometry3::identity();
         Self { name: tag.to_string(), tags: vec![BodyTag { tag, size_m, body_from_tag }] }
-    }
-
-    /// The tags of a board, in the board's frame.
-    pub fn from_board(name: impl Into<String>, board: &Board) -> Self {
-        let tag = |tag: &crate::board::BoardTag| {
-            let [x, y] = tag.position_m;
-            BodyTag {
-                tag: TagId { family: board.family, id: tag.id },
-                size_m: tag.size_m,
-                body_from_tag: Isometry3::from_parts(
-                    Translation3::new(x, y, 0.0),
-                    UnitQuaternion::identity(),
-                ),
-            }
-        };
-        Self { name: name.into(), tags: board.tags.iter().map(tag).collect() }
     }
 
     /// Its tag of that name.

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | [`family`] | the tag families |
 //! | [`bitmap`] | black and white cells of a tag |
-//! | [`board`] | the board file: tags printed on one sheet |
+//! | [`board`] | the board file: tags that are fixed to each other, on one sheet or in space |
 //! | [`luma`] | the borrowed image that is looked at |
 //! | [`detection`] | tags found in an image |
 //! | [`body`] | tags that are fixed to each other |
@@ -20,7 +20,7 @@ pub mod luma;
 pub mod refine;
 
 pub use bitmap::{TagBitmap, TagError, tag_bitmap};
-pub use board::{Board, BoardTag};
+pub use board::{Board, BoardMistake, BoardProvenance, BoardTag};
 pub use body::{Body, BodyTag};
 pub use detection::{Detection, TagId, TagObservation, UNIT_CORNERS};
 pub use family::Family;

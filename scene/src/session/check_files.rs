@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use coshade_config::{KeyPath, Problem};
+use coshade_tracker::Board;
 
 use super::Session;
 use super::check_content::source_file;
@@ -52,7 +53,7 @@ impl Check<'_> {
         if let Some(AnchorTarget::Board { board }) =
             spec.tracking.as_ref().map(|tracking| &tracking.anchor.target)
         {
-            self.file(board, &root.key("tracking").key("anchor").key("board"));
+            self.board(board, &root.key("tracking").key("anchor").key("board"));
         }
         for (index, thing) in spec.things.iter().enumerate() {
             let at = root.key("thing").index(index);
@@ -133,11 +134,19 @@ impl Check<'_> {
         }
     }
 
+    fn board(&mut self, path: &Path, at: &KeyPath) {
+        if self.file(path, at)
+            && let Err(error) = Board::read(self.session.resolve(path))
+        {
+            self.error(at, format!("not a board: {error}"), "");
+        }
+    }
+
     fn pose(&mut self, pose: &PoseSpec, at: &KeyPath) {
         match pose {
-            PoseSpec::Body { body, .. } => self.file(body, &at.key("body")),
-            PoseSpec::Board { board, .. } => self.file(board, &at.key("board")),
-            PoseSpec::World { .. } | PoseSpec::Marker { .. } => true,
-        };
+            PoseSpec::Body { body, .. } => self.board(body, &at.key("body")),
+            PoseSpec::Board { board, .. } => self.board(board, &at.key("board")),
+            PoseSpec::World { .. } | PoseSpec::Marker { .. } => {}
+        }
     }
 }

@@ -26,7 +26,7 @@ pub enum PoseSpec {
     },
     /// Attached to a rigid body with several tags.
     Body {
-        /// File that describes the body. Relative to the session file.
+        /// File that says where its tags are, written as a board. Relative to the session file.
         body: PathBuf,
         /// Place and orientation in the body's frame.
         #[serde(flatten)]

@@ -12,8 +12,7 @@ use coshade_config::{Document, Error, Problem};
 use coshade_lens::calibration::{Calibration, CalibrationError, Response};
 use coshade_reference::emitter::{Environment, EnvironmentFile, EnvironmentFileError};
 use coshade_reference::integrator::{TraceError, TraceScene};
-use coshade_tracker::Board;
-use glam::DVec3;
+use coshade_tracker::{Board, BoardMistake};
 
 pub use scene::PlacedTag;
 pub use spec::{MountSpec, SensorSpec, WorldSpec};
@@ -66,6 +65,14 @@ pub enum WorldError {
         id: u32,
         /// Why not.
         reason: String,
+    },
+    /// A board's tags have no places.
+    #[error("{}: {mistake}", path.display())]
+    Board {
+        /// The board file.
+        path: PathBuf,
+        /// What is wrong with it.
+        mistake: BoardMistake,
     },
     /// The image of the environment cannot be used.
     #[error("environment: {0}")]
@@ -155,15 +162,15 @@ impl World {
         for spec in &self.spec().boards {
             let board = Board::read(self.resolve(&spec.file))?;
             let world_from_board = scene::rigid(&spec.pose);
-            tags.extend(board.tags.iter().map(|tag| {
-                let [x, y] = tag.position_m;
-                let board_from_tag = Rigid { position_m: DVec3::new(x, y, 0.0), ..Rigid::IDENTITY };
-                PlacedTag {
-                    family: board.family.name().to_owned(),
-                    id: tag.id,
-                    size_m: tag.size_m,
-                    world_from_tag: world_from_board * board_from_tag,
-                }
+            let placed = board.placed_tags().map_err(|mistake| WorldError::Board {
+                path: self.resolve(&spec.file),
+                mistake,
+            })?;
+            tags.extend(placed.into_iter().map(|tag| PlacedTag {
+                family: tag.tag.family.name().to_owned(),
+                id: tag.tag.id,
+                size_m: tag.size_m,
+                world_from_tag: world_from_board * Rigid::from(tag.body_from_tag),
             }));
         }
         Ok(tags)
