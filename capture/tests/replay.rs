@@ -7,7 +7,7 @@ mod support;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use coshade_capture::recording::{Compression, RecordingOptions, RecordingWriter};
+use coshade_capture::recording::{Compression, Reader, RecordingOptions, RecordingWriter};
 use coshade_capture::replay::{Playback, Rate, ReplayCamera, ReplayOptions};
 use coshade_capture::{Camera, CaptureError, Control, ControlValue, Frame, PixelFormat, Timestamp, clock};
 use coshade_lens::calibration::Calibration;
@@ -47,6 +47,28 @@ fn options(rate: Rate, looping: bool) -> ReplayOptions {
 
 fn ended(camera: &mut ReplayCamera) -> bool {
     matches!(camera.next_frame(LONG), Err(CaptureError::EndOfStream { .. }))
+}
+
+#[test]
+fn a_frame_that_was_taken_first_but_arrived_later_is_played() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("late.mcap");
+    let mut writer = RecordingWriter::create(&path, small_chunks(Compression::None)).unwrap();
+    let camera = writer.add_stream("camera", None, Some(50.0)).unwrap();
+    let depth = writer.add_stream("depth", None, Some(50.0)).unwrap();
+    for index in 0..4 {
+        writer.write(camera, &regular(index, 4_000_000), 0).unwrap();
+        // Slower to arrive, in a chunk of its own.
+        writer.write(depth, &regular(index, 0), 0).unwrap();
+    }
+    writer.finish(&[0, 0]).unwrap();
+    let mut depth = ReplayCamera::open(&format!("replay:{}#depth?rate=max", path.display())).unwrap();
+    for index in 0..4 {
+        assert_same(&depth.next_frame(LONG).unwrap(), &regular(index, 0));
+    }
+    assert!(ended(&mut depth));
+    let first = regular(0, 0).captured;
+    assert_eq!(Reader::open(&path).unwrap().span().unwrap(), Some((first, regular(3, 4_000_000).captured)));
 }
 
 #[test]

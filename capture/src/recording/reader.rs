@@ -7,7 +7,7 @@ use std::path::Path;
 
 use prost::Message as _;
 
-use super::container::{Container, Damage, Loaded, Message, Source};
+use super::container::{Block, Container, Damage, Loaded, Message, Source};
 use super::error::RecordingError;
 use super::foreign;
 use super::frame_info::FrameInfo;
@@ -280,28 +280,31 @@ impl Reader {
     /// # Errors
     /// [`RecordingError::Read`] if the disk fails.
     pub fn span(&mut self) -> Result<Option<(Timestamp, Timestamp)>, RecordingError> {
-        let blocks = self.container.blocks().len();
-        let first = self.image_times(&mut (0..blocks))?.map(|times| times.0);
-        let last = self.image_times(&mut (0..blocks).rev())?.map(|times| times.1);
-        self.seek(Timestamp::default());
-        Ok(first.zip(last).map(|(first, last)| (Timestamp::from_ns(first), Timestamp::from_ns(last))))
-    }
-
-    /// Smallest and largest log time of an image in the first of `blocks` that has any.
-    fn image_times(
-        &mut self,
-        blocks: &mut dyn Iterator<Item = usize>,
-    ) -> Result<Option<(u64, u64)>, RecordingError> {
-        for block in blocks {
-            self.load_leniently(block)?;
-            let is_image =
-                |message: &&Message| matches!(self.roles.get(&message.channel), Some(Role::Image { .. }));
-            let times = self.loaded.messages.iter().filter(is_image).map(|message| message.log_time_ns);
-            if let Some(range) = times.clone().min().zip(times.max()) {
-                return Ok(Some(range));
+        // Messages stand in the order of their arrival: what was taken first need not be in the first block.
+        let (mut first, mut last) = (u64::MAX, None);
+        let times = |block: &Block| (block.start_ns, block.end_ns);
+        let blocks: Vec<(u64, u64)> = self.container.blocks().iter().map(times).collect();
+        for (block, (start_ns, _)) in blocks.iter().enumerate() {
+            if *start_ns < first {
+                first = self.image_times(block)?.map_or(first, |(earliest, _)| first.min(earliest));
             }
         }
-        Ok(None)
+        for (block, (_, end_ns)) in blocks.iter().enumerate().rev() {
+            if last.is_none_or(|last| *end_ns > last) {
+                last = last.max(self.image_times(block)?.map(|(_, latest)| latest));
+            }
+        }
+        self.seek(Timestamp::default());
+        Ok(last.map(|last| (Timestamp::from_ns(first), Timestamp::from_ns(last))))
+    }
+
+    /// Smallest and largest log time of an image in a block, `None` if there is none.
+    fn image_times(&mut self, block: usize) -> Result<Option<(u64, u64)>, RecordingError> {
+        self.load_leniently(block)?;
+        let is_image =
+            |message: &&Message| matches!(self.roles.get(&message.channel), Some(Role::Image { .. }));
+        let times = self.loaded.messages.iter().filter(is_image).map(|message| message.log_time_ns);
+        Ok(times.clone().min().zip(times.max()))
     }
 
     /// Loads a block; of a damaged one nothing.
