@@ -46,3 +46,12 @@ pub struct TagObservation {
     /// Covariance of the corners, in px², in the order x₀ y₀ x₁ y₁ ….
     pub covariance_px2: SMatrix<f64, 8, 8>,
 }
+
+impl TagObservation {
+    /// The corners as the detector gives them, each known to `sigma_px` (standard deviation) in x and y, all independent
+    /// of each other. What is not above zero is refused by the solvers.
+    pub fn from_detection(detection: &Detection, sigma_px: f64) -> Self {
+        let covariance_px2 = SMatrix::identity() * (sigma_px * sigma_px);
+        Self { tag: detection.tag, corners_px: detection.corners_px, covariance_px2 }
+    }
+}

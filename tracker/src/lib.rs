@@ -8,7 +8,10 @@
 //! | [`luma`] | the borrowed image that is looked at |
 //! | [`detection`] | tags found in an image |
 //! | [`body`] | tags that are fixed to each other |
+//! | [`planar`] | both poses of a single tag |
+//! | [`pose`] | the pose of a body in one image |
 //! | [`lie`] | exponential and logarithm of rigid motions |
+//! | [`print`] | tags on paper: PDF, SVG, PNG |
 
 pub mod bitmap;
 pub mod board;
@@ -17,11 +20,16 @@ pub mod detection;
 pub mod family;
 pub mod lie;
 pub mod luma;
+pub mod planar;
+pub mod pose;
+pub mod print;
 pub mod refine;
 
 pub use bitmap::{TagBitmap, TagError, tag_bitmap};
 pub use board::{Board, BoardMistake, BoardProvenance, BoardTag};
-pub use body::{Body, BodyTag};
+pub use body::{Body, BodyError, BodyTag};
 pub use detection::{Detection, TagId, TagObservation, UNIT_CORNERS};
 pub use family::Family;
 pub use luma::{Luma, LumaError};
+pub use planar::{PlanarError, PlanarPose, planar_poses};
+pub use pose::{BodyPose, Certainty, Past, PoseError, PoseEstimate, PoseSolver};

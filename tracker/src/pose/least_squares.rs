@@ -1,0 +1,128 @@
+//! Poses by non-linear least squares.
+
+use nalgebra::{Isometry3, Matrix3, Matrix6, Translation3, Vector3, Vector6};
+
+use super::residuals::{Imaging, Target, disturbed};
+use crate::lie;
+
+/// Steps tried at most.
+pub(crate) const MAX_STEPS: usize = 40;
+/// A step that promises less than this of χ² is the last one: it is 10⁻⁵ of a standard deviation.
+const CONVERGED: f64 = 1e-10;
+/// … and less than this of all χ², where that is large.
+const CONVERGED_RELATIVE: f64 = 1e-12;
+const FIRST_DAMPING: f64 = 1e-4;
+const MAX_DAMPING: f64 = 1e8;
+
+/// What a fit may change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Free {
+    Pose,
+    Translation,
+}
+
+/// A pose that fits.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Fit {
+    pub camera_from_body: Isometry3<f64>,
+    /// Weighted sum of squares in units of the errors.
+    pub chi2: f64,
+    /// What a twist about `centre` is known by: the inverse of its covariance.
+    information: Matrix6<f64>,
+    centre: Vector3<f64>,
+}
+
+/// The sum of squares around a pose to second order.
+struct Quadratic {
+    chi2: f64,
+    hessian: Matrix6<f64>,
+    gradient: Vector6<f64>,
+    centre: Vector3<f64>,
+}
+
+impl Fit {
+    /// Covariance of a twist on the left of the pose, `None` if some of it is not determined.
+    pub fn covariance(&self) -> Option<Matrix6<f64>> {
+        let there = Translation3::from(self.centre);
+        let carried = lie::adjoint(&Isometry3::from(there));
+        let covariance = carried * self.information.cholesky()?.inverse() * carried.transpose();
+        covariance.iter().all(|x| x.is_finite()).then_some((covariance + covariance.transpose()) / 2.0)
+    }
+}
+
+/// The pose near `start` with the least weighted sum of squares (Levenberg and Marquardt), targets of weight 0 left
+/// out. `None` if at `start` a target is outside the lens' field of view, or all weights are 0.
+pub(crate) fn minimise(
+    imaging: &Imaging<'_>,
+    targets: &[Target],
+    weights: &[f64],
+    start: &Isometry3<f64>,
+    free: Free,
+    max_steps: usize,
+) -> Option<Fit> {
+    let middle = middle(targets, weights)?;
+    let around = |pose: &Isometry3<f64>| quadratic(imaging, targets, weights, pose, &middle, free);
+    let mut pose = *start;
+    let mut here = around(&pose)?;
+    let mut damping = FIRST_DAMPING;
+    for _ in 0..max_steps {
+        let mut damped = here.hessian;
+        damped.set_diagonal(&(here.hessian.diagonal() * (1.0 + damping)));
+        let Some(factor) = damped.cholesky() else { break };
+        let step = -factor.solve(&here.gradient);
+        let promised = -step.dot(&here.gradient);
+        if promised.is_nan() || promised < CONVERGED.max(CONVERGED_RELATIVE * here.chi2) {
+            break;
+        }
+        let next_pose = disturbed(&pose, &here.centre, &step);
+        match around(&next_pose).filter(|next| next.chi2 < here.chi2) {
+            Some(next) => {
+                (pose, here) = (next_pose, next);
+                damping *= 0.05;
+            }
+            None if damping > MAX_DAMPING => break,
+            None => damping = (damping * 10.0).max(FIRST_DAMPING),
+        }
+    }
+    let information = match free {
+        Free::Pose => here.hessian,
+        Free::Translation => quadratic(imaging, targets, weights, &pose, &middle, Free::Pose)?.hessian,
+    };
+    Some(Fit { camera_from_body: pose, chi2: here.chi2, information, centre: here.centre })
+}
+
+/// The middle of the corners in the body's frame: rotation and translation are least correlated about it.
+pub(crate) fn middle(targets: &[Target], weights: &[f64]) -> Option<Vector3<f64>> {
+    let (mut sum, mut count) = (Vector3::zeros(), 0.0);
+    for (target, _) in targets.iter().zip(weights).filter(|(_, weight)| **weight > 0.0) {
+        sum += target.corners_m.iter().map(|corner| corner.coords).sum::<Vector3<f64>>();
+        count += 4.0;
+    }
+    (count > 0.0).then(|| sum / count)
+}
+
+fn quadratic(
+    imaging: &Imaging<'_>,
+    targets: &[Target],
+    weights: &[f64],
+    pose: &Isometry3<f64>,
+    middle: &Vector3<f64>,
+    free: Free,
+) -> Option<Quadratic> {
+    let centre = (pose * nalgebra::Point3::from(*middle)).coords;
+    let view = imaging.at(pose);
+    let mut sum = Quadratic { chi2: 0.0, hessian: Matrix6::zeros(), gradient: Vector6::zeros(), centre };
+    for (target, &weight) in targets.iter().zip(weights).filter(|(_, weight)| **weight > 0.0) {
+        let (residual, jacobian) = view.linearised(target, &centre)?;
+        sum.chi2 += weight * residual.norm_squared();
+        sum.hessian += jacobian.tr_mul(&jacobian) * weight;
+        sum.gradient += jacobian.tr_mul(&residual) * weight;
+    }
+    if free == Free::Translation {
+        sum.gradient.fixed_rows_mut::<3>(0).fill(0.0);
+        sum.hessian.fixed_view_mut::<3, 3>(0, 3).fill(0.0);
+        sum.hessian.fixed_view_mut::<3, 3>(3, 0).fill(0.0);
+        sum.hessian.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());
+    }
+    sum.chi2.is_finite().then_some(sum)
+}
