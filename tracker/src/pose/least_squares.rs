@@ -13,6 +13,9 @@ const CONVERGED: f64 = 1e-10;
 const CONVERGED_RELATIVE: f64 = 1e-12;
 const FIRST_DAMPING: f64 = 1e-4;
 const MAX_DAMPING: f64 = 1e8;
+/// Poses further away than this many times a thing's extent are none: it would be far less than a pixel wide, and what
+/// leads there is nonsense that fits best as a point.
+const FURTHEST: f64 = 1e5;
 
 /// What a fit may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,7 +49,9 @@ impl Fit {
         let there = Translation3::from(self.centre);
         let carried = lie::adjoint(&Isometry3::from(there));
         let covariance = carried * self.information.cholesky()?.inverse() * carried.transpose();
-        covariance.iter().all(|x| x.is_finite()).then_some((covariance + covariance.transpose()) / 2.0)
+        let covariance = (covariance + covariance.transpose()) / 2.0;
+        // Rounding spoils what is hardly determined; infinities have no factor either.
+        covariance.cholesky().map(|_| covariance)
     }
 }
 
@@ -61,7 +66,11 @@ pub(crate) fn minimise(
     max_steps: usize,
 ) -> Option<Fit> {
     let middle = middle(targets, weights)?;
-    let around = |pose: &Isometry3<f64>| quadratic(imaging, targets, weights, pose, &middle, free);
+    let furthest_m = FURTHEST * extent_m(targets, weights, &middle);
+    let around = |pose: &Isometry3<f64>| {
+        let there = quadratic(imaging, targets, weights, pose, &middle, free)?;
+        (there.centre.norm() <= furthest_m).then_some(there)
+    };
     let mut pose = *start;
     let mut here = around(&pose)?;
     let mut damping = FIRST_DAMPING;
@@ -99,6 +108,14 @@ pub(crate) fn middle(targets: &[Target], weights: &[f64]) -> Option<Vector3<f64>
         count += 4.0;
     }
     (count > 0.0).then(|| sum / count)
+}
+
+/// How far corners are from their middle at most.
+fn extent_m(targets: &[Target], weights: &[f64], middle: &Vector3<f64>) -> f64 {
+    let used = targets.iter().zip(weights).filter(|(_, weight)| **weight > 0.0);
+    let distances =
+        used.flat_map(|(target, _)| &target.corners_m).map(|corner| (corner.coords - middle).norm());
+    distances.fold(0.0, f64::max)
 }
 
 fn quadratic(
