@@ -17,6 +17,7 @@ pub mod bitmap;
 pub mod board;
 pub mod body;
 pub mod detection;
+pub mod detector;
 pub mod family;
 pub mod lie;
 pub mod luma;
