@@ -26,6 +26,7 @@ enum Command {
     Reference(command::reference::Args),
     Sheet(command::sheet::Args),
     Simulate(command::simulate::Args),
+    Board(command::board::Args),
     Export(command::export::Args),
     Doctor(command::doctor::Args),
 }
@@ -48,6 +49,7 @@ fn main() -> ExitCode {
         Command::Reference(args) => command::reference::run(&args),
         Command::Sheet(args) => command::sheet::run(&args),
         Command::Simulate(args) => command::simulate::run(&args),
+        Command::Board(args) => command::board::run(&args),
         Command::Export(args) => command::export::run(&args),
         Command::Doctor(args) => command::doctor::run(&args),
     };

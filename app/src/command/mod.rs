@@ -1,6 +1,7 @@
 //! One module a subcommand. Each returns its exit code: 0 = fine, 1 = it ran and found something wrong; an
 //! error (2) means it could not run.
 
+pub mod board;
 pub mod compare;
 pub mod doctor;
 pub mod export;

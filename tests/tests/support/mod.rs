@@ -1,6 +1,7 @@
 //! Runs the `coshade` binary, and makes files for it.
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "helpers of tests: a panic is a failed test")]
+#![allow(dead_code, reason = "not every test uses every helper")]
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

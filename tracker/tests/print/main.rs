@@ -1,6 +1,6 @@
 //! Printed sheets: what is drawn against the board that goes with it, and each kind of file against the drawing.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "helpers of tests: a panic is a failed test")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests: a panic is a failed test")]
 
 mod files;
 mod layout;
