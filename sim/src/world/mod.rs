@@ -162,10 +162,9 @@ impl World {
         for spec in &self.spec().boards {
             let board = Board::read(self.resolve(&spec.file))?;
             let world_from_board = scene::rigid(&spec.pose);
-            let placed = board.placed_tags().map_err(|mistake| WorldError::Board {
-                path: self.resolve(&spec.file),
-                mistake,
-            })?;
+            let placed = board
+                .placed_tags()
+                .map_err(|mistake| WorldError::Board { path: self.resolve(&spec.file), mistake })?;
             tags.extend(placed.into_iter().map(|tag| PlacedTag {
                 family: tag.tag.family.name().to_owned(),
                 id: tag.tag.id,
