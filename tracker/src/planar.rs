@@ -13,7 +13,7 @@ use nalgebra::{
 
 use crate::body::{BodyTag, SIZE_RANGE_M};
 use crate::detection::{TagId, TagObservation};
-use crate::pose::least_squares::{Fit, Free, MAX_STEPS, minimise};
+use crate::pose::least_squares::{Fit, Search, minimise};
 use crate::pose::mirror::{angle_rad, mirrored_fit};
 use crate::pose::residuals::{Imaging, Target};
 
@@ -104,7 +104,7 @@ pub fn planar_poses(
         Target::new(observation, own.corners_m(), [0.0; 4]).ok_or(PlanarError::Covariance { tag })?;
     let imaging = Imaging { lens, motion: None };
     let targets = [target];
-    let fits = starts.map(|start| minimise(&imaging, &targets, &[1.0], &start, Free::Pose, MAX_STEPS));
+    let fits = starts.map(|start| minimise(&imaging, &targets, &[1.0], &start, Search::FULL));
     let better = |a: Fit, b: Fit| if a.chi2 <= b.chi2 { a } else { b };
     let best = fits.iter().flatten().copied().reduce(better).ok_or(PlanarError::NoFit { tag })?;
     let other = mirrored_fit(&imaging, &targets, &[1.0], &best).ok_or(PlanarError::NoFit { tag })?;

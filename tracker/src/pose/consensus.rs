@@ -3,12 +3,11 @@
 use nalgebra::Isometry3;
 
 use super::chi_squared::{MEDIAN_OF_8, ONE_IN_1E6, limit};
-use super::least_squares::{Fit, Free, MAX_STEPS, minimise};
+use super::least_squares::{Fit, Search, minimise};
 use super::residuals::{Imaging, Target};
 
-/// Rounds of reweighting at most, and steps of a fit in each.
+/// Rounds of reweighting at most.
 const ROUNDS: usize = 20;
-const STEPS_A_ROUND: usize = 3;
 /// Weights that change less than this from round to round have settled.
 const SETTLED: f64 = 1e-3;
 /// Rounds in which tags are taken in or left out at most.
@@ -48,7 +47,9 @@ pub(crate) fn robust_score(imaging: &Imaging<'_>, targets: &[Target], pose: &Iso
 /// at most one is used. Without a majority nobody can tell who is wrong: then all are used, and fit badly.
 pub(crate) fn agree(imaging: &Imaging<'_>, targets: &[Target], start: &Isometry3<f64>) -> Option<Consensus> {
     let kept = best_of_each_tag(targets, &squares(imaging, targets, start));
-    let all = minimise(imaging, targets, &kept, start, Free::Pose, MAX_STEPS);
+    let all = minimise(imaging, targets, &kept, start, Search::ROUGH)
+        .filter(|rough| rough.chi2 <= limit(8.0, ONE_IN_1E6) * kept.iter().sum::<f64>())
+        .and_then(|rough| minimise(imaging, targets, &kept, &rough.camera_from_body, Search::FULL));
     if let Some(fit) = all {
         let squares = squares(imaging, targets, &fit.camera_from_body);
         let same = best_of_each_tag(targets, &squares) == kept;
@@ -107,7 +108,7 @@ fn reweighted(imaging: &Imaging<'_>, targets: &[Target], start: &Isometry3<f64>)
         if weights.iter().zip(&before).all(|(now, before)| (now - before).abs() < SETTLED) {
             break;
         }
-        pose = minimise(imaging, targets, &weights, &pose, Free::Pose, STEPS_A_ROUND)?.camera_from_body;
+        pose = minimise(imaging, targets, &weights, &pose, Search::SHORT)?.camera_from_body;
         before = weights;
     }
     Some(pose)
@@ -126,7 +127,7 @@ fn select(imaging: &Imaging<'_>, targets: &[Target], pose: &Isometry3<f64>) -> O
         if let Some(last) = last.take_if(|last| last.weights == weights) {
             return Some(last);
         }
-        let fit = minimise(imaging, targets, &weights, &pose, Free::Pose, MAX_STEPS)?;
+        let fit = minimise(imaging, targets, &weights, &pose, Search::FULL)?;
         pose = fit.camera_from_body;
         last = Some(Consensus { fit, weights });
     }

@@ -5,23 +5,34 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Translation3, Vector3, Vector6};
 use super::residuals::{Imaging, Target, disturbed};
 use crate::lie;
 
-/// Steps tried at most.
-pub(crate) const MAX_STEPS: usize = 40;
 /// A step that promises less than this of χ² is the last one: it is 10⁻⁵ of a standard deviation.
 const CONVERGED: f64 = 1e-10;
-/// … and less than this of all χ², where that is large.
-const CONVERGED_RELATIVE: f64 = 1e-12;
 const FIRST_DAMPING: f64 = 1e-4;
 const MAX_DAMPING: f64 = 1e8;
 /// Poses further away than this many times a thing's extent are none: it would be far less than a pixel wide, and what
 /// leads there is nonsense that fits best as a point.
 const FURTHEST: f64 = 1e5;
 
-/// What a fit may change.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Free {
-    Pose,
-    Translation,
+/// What a fit may change, and how far it goes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Search {
+    /// Whether rotation is kept.
+    pub translation_only: bool,
+    /// Steps tried at most.
+    pub max_steps: usize,
+    /// A step that promises less than this part of χ² is the last one.
+    pub least_gain: f64,
+}
+
+impl Search {
+    /// To the minimum, up to rounding.
+    pub const FULL: Self = Self { translation_only: false, max_steps: 40, least_gain: 1e-12 };
+    /// Near enough to see whether a minimum can be a good one.
+    pub const ROUGH: Self = Self { least_gain: 1e-3, ..Self::FULL };
+    /// The translation that goes with a rotation.
+    pub const TRANSLATION: Self = Self { translation_only: true, max_steps: 10, ..Self::FULL };
+    /// A few steps towards it, before weights change.
+    pub const SHORT: Self = Self { max_steps: 3, ..Self::FULL };
 }
 
 /// A pose that fits.
@@ -62,13 +73,13 @@ pub(crate) fn minimise(
     targets: &[Target],
     weights: &[f64],
     start: &Isometry3<f64>,
-    free: Free,
-    max_steps: usize,
+    search: Search,
 ) -> Option<Fit> {
+    let Search { translation_only, max_steps, least_gain } = search;
     let middle = middle(targets, weights)?;
     let furthest_m = FURTHEST * extent_m(targets, weights, &middle);
     let around = |pose: &Isometry3<f64>| {
-        let there = quadratic(imaging, targets, weights, pose, &middle, free)?;
+        let there = quadratic(imaging, targets, weights, pose, &middle, translation_only)?;
         (there.centre.norm() <= furthest_m).then_some(there)
     };
     let mut pose = *start;
@@ -80,7 +91,7 @@ pub(crate) fn minimise(
         let Some(factor) = damped.cholesky() else { break };
         let step = -factor.solve(&here.gradient);
         let promised = -step.dot(&here.gradient);
-        if promised.is_nan() || promised < CONVERGED.max(CONVERGED_RELATIVE * here.chi2) {
+        if promised.is_nan() || promised < CONVERGED.max(least_gain * here.chi2) {
             break;
         }
         let next_pose = disturbed(&pose, &here.centre, &step);
@@ -93,9 +104,9 @@ pub(crate) fn minimise(
             None => damping = (damping * 10.0).max(FIRST_DAMPING),
         }
     }
-    let information = match free {
-        Free::Pose => here.hessian,
-        Free::Translation => quadratic(imaging, targets, weights, &pose, &middle, Free::Pose)?.hessian,
+    let information = match translation_only {
+        false => here.hessian,
+        true => quadratic(imaging, targets, weights, &pose, &middle, false)?.hessian,
     };
     Some(Fit { camera_from_body: pose, chi2: here.chi2, information, centre: here.centre })
 }
@@ -124,7 +135,7 @@ fn quadratic(
     weights: &[f64],
     pose: &Isometry3<f64>,
     middle: &Vector3<f64>,
-    free: Free,
+    translation_only: bool,
 ) -> Option<Quadratic> {
     let centre = (pose * nalgebra::Point3::from(*middle)).coords;
     let view = imaging.at(pose);
@@ -135,7 +146,7 @@ fn quadratic(
         sum.hessian += jacobian.tr_mul(&jacobian) * weight;
         sum.gradient += jacobian.tr_mul(&residual) * weight;
     }
-    if free == Free::Translation {
+    if translation_only {
         sum.gradient.fixed_rows_mut::<3>(0).fill(0.0);
         sum.hessian.fixed_view_mut::<3, 3>(0, 3).fill(0.0);
         sum.hessian.fixed_view_mut::<3, 3>(3, 0).fill(0.0);

@@ -6,11 +6,16 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-use super::least_squares::{Fit, Free, MAX_STEPS, middle, minimise};
+use super::least_squares::{Fit, Search, middle, minimise};
 use super::residuals::{Imaging, Target};
 
 /// Poses closer than this in rotation are one minimum, found twice.
 const SAME_MINIMUM_RAD: f64 = 2e-3;
+
+/// A pose whose χ² is this many times the best one's (or that of a few tags) is out of the question, however well it is
+/// found.
+const HOPELESS: f64 = 20.0;
+const FEW: f64 = 50.0;
 
 /// The best pose in the mirrored orientation of `best`. Where perspective is so strong, or the thing is seen so
 /// frontally, that no minimum lies there: the mirrored rotation itself, with the translation that fits best. `None` if
@@ -22,9 +27,13 @@ pub(crate) fn mirrored_fit(
     best: &Fit,
 ) -> Option<Fit> {
     let mirrored = mirrored(targets, weights, &best.camera_from_body)?;
-    let fit = |start: &Isometry3<f64>, free| minimise(imaging, targets, weights, start, free, MAX_STEPS);
-    let shifted = fit(&mirrored, Free::Translation)?;
-    let free = fit(&shifted.camera_from_body, Free::Pose)?;
+    let fit = |start: &Isometry3<f64>, search| minimise(imaging, targets, weights, start, search);
+    let shifted = fit(&mirrored, Search::TRANSLATION)?;
+    let rough = fit(&shifted.camera_from_body, Search::ROUGH)?;
+    if rough.chi2 > HOPELESS * best.chi2.max(FEW) {
+        return Some(rough);
+    }
+    let free = fit(&rough.camera_from_body, Search::FULL)?;
     let merged = angle_rad(&free.camera_from_body, &best.camera_from_body) < SAME_MINIMUM_RAD;
     Some(if merged { shifted } else { free })
 }

@@ -7,7 +7,7 @@ use nalgebra::Isometry3;
 
 use super::consensus::{Consensus, agree, robust_score};
 use super::decision::Rivals;
-use super::least_squares::{Fit, Free, MAX_STEPS, minimise};
+use super::least_squares::{Fit, Search, minimise};
 use super::mirror::{angle_rad, is_flat, mirrored_fit};
 use super::residuals::{Imaging, Target};
 use super::rolling::RowMotion;
@@ -227,7 +227,7 @@ impl Scene<'_> {
         let elsewhere = |pose: &Isometry3<f64>| angle_rad(pose, &fit.camera_from_body) > OTHER_START_RAD;
         let start = starts.iter().find(|start| elsewhere(start));
         let followed = start
-            .and_then(|start| minimise(&self.imaging, &self.targets, weights, start, Free::Pose, MAX_STEPS))
+            .and_then(|start| minimise(&self.imaging, &self.targets, weights, start, Search::FULL))
             .filter(|followed| elsewhere(&followed.camera_from_body));
         [mirrored, followed].into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
     }
