@@ -1,7 +1,9 @@
 //! The `coshade` command line.
 
+mod canvas;
 mod command;
 mod interrupt;
+mod pipeline;
 mod sources;
 
 use std::io::IsTerminal;
@@ -22,6 +24,7 @@ enum Command {
     Info(command::info::Args),
     Record(command::record::Args),
     Replay(command::replay::Args),
+    Track(command::track::Args),
     Compare(command::compare::Args),
     Reference(command::reference::Args),
     Sheet(command::sheet::Args),
@@ -45,6 +48,7 @@ fn main() -> ExitCode {
         Command::Info(args) => command::info::run(&args),
         Command::Record(args) => command::record::run(&args),
         Command::Replay(args) => command::replay::run(&args),
+        Command::Track(args) => command::track::run(&args),
         Command::Compare(args) => command::compare::run(&args),
         Command::Reference(args) => command::reference::run(&args),
         Command::Sheet(args) => command::sheet::run(&args),

@@ -13,6 +13,7 @@ pub mod replay;
 pub mod sheet;
 pub mod simulate;
 pub mod traced;
+pub mod track;
 
 /// A length of time, of an argument in seconds: ten years at most, so that sums with it stay in range.
 fn seconds(text: &str) -> Result<std::time::Duration, String> {

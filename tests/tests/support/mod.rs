@@ -54,7 +54,7 @@ impl Run {
 }
 
 /// The program that `cargo test --workspace` has built beside this test.
-fn binary() -> PathBuf {
+pub fn binary() -> PathBuf {
     let test = std::env::current_exe().unwrap();
     let folder = test.parent().and_then(Path::parent).unwrap();
     let binary = folder.join("coshade");

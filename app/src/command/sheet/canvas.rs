@@ -1,10 +1,10 @@
 //! Where tiles and text go.
 
-use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
-use anyhow::{Context as _, bail};
+use anyhow::bail;
 use image::{GenericImage, Rgb, RgbImage};
 
 use super::Tile;
+use crate::canvas::{self, Text};
 
 const PAPER: Rgb<u8> = Rgb([250, 250, 248]);
 const INK: Rgb<u8> = Rgb([40, 40, 44]);
@@ -12,8 +12,6 @@ const INK: Rgb<u8> = Rgb([40, 40, 44]);
 const GAP_PX: u32 = 12;
 const LABEL_PX: u32 = 22;
 const TITLE_PX: u32 = 34;
-/// Height of letters as a share of the line.
-const TEXT_SHARE: f32 = 0.76;
 /// A sheet beyond this is a mistake rather than something to look at.
 const MAX_PIXELS: u64 = 1 << 28;
 
@@ -54,10 +52,13 @@ impl Sheet {
             bail!("the sheet would have {width}x{height} pixels: give fewer pictures or a smaller --tile-px");
         }
         let mut canvas = RgbImage::from_pixel(width, height as u32, PAPER);
-        let font =
-            FontRef::try_from_slice(epaint_default_fonts::UBUNTU_LIGHT).context("the font of labels")?;
+        let font = canvas::font()?;
+        let write = |canvas: &mut RgbImage, line: &str, [left, top]: [u32; 2], height_px, room_px| {
+            let at_px = [left as f32, top as f32];
+            Text { font: &font, line, at_px, height_px, room_px, ink: INK }.draw(canvas);
+        };
         if let Some(title) = &self.title {
-            text(&mut canvas, &font, title, [GAP_PX, GAP_PX / 2], TITLE_PX, width - 2 * GAP_PX);
+            write(&mut canvas, title, [GAP_PX, GAP_PX / 2], TITLE_PX, width - 2 * GAP_PX);
         }
         let mut top = GAP_PX + title;
         for (row, height) in self.rows.iter().zip(heights) {
@@ -65,7 +66,7 @@ impl Sheet {
                 let left = GAP_PX + column * (self.tile_px + GAP_PX);
                 let inset = (self.tile_px - tile.image.width()) / 2;
                 canvas.copy_from(&tile.image, left + inset, top)?;
-                text(&mut canvas, &font, &tile.label, [left, top + height], LABEL_PX, self.tile_px);
+                write(&mut canvas, &tile.label, [left, top + height], LABEL_PX, self.tile_px);
             }
             top += height + LABEL_PX + GAP_PX;
         }
@@ -75,48 +76,4 @@ impl Sheet {
 
 fn row_height(row: &[Tile]) -> u32 {
     row.iter().map(|tile| tile.image.height()).max().unwrap_or(0)
-}
-
-/// One line, smaller where it would be wider than `room_px`.
-fn text(
-    canvas: &mut RgbImage,
-    font: &FontRef<'_>,
-    line: &str,
-    [left, top]: [u32; 2],
-    height_px: u32,
-    room_px: u32,
-) {
-    let wanted = height_px as f32 * TEXT_SHARE;
-    let advance = |size: f32| {
-        let font = font.as_scaled(PxScale::from(size));
-        line.chars().map(|letter| font.h_advance(font.glyph_id(letter))).sum::<f32>()
-    };
-    let size = wanted * (room_px as f32 / advance(wanted).max(1.0)).min(1.0);
-    let scaled = font.as_scaled(PxScale::from(size));
-    let baseline = top as f32 + (height_px as f32 + scaled.ascent() + scaled.descent()) / 2.0;
-    let mut x = left as f32;
-    for letter in line.chars() {
-        let glyph = scaled.scaled_glyph(letter);
-        let advance = scaled.h_advance(glyph.id);
-        let placed = ab_glyph::Glyph { position: point(x, baseline), ..glyph };
-        if let Some(outline) = scaled.outline_glyph(placed) {
-            let bounds = outline.px_bounds();
-            outline.draw(|dx, dy, share| {
-                let (px, py) = (bounds.min.x + dx as f32, bounds.min.y + dy as f32);
-                if px >= 0.0 && py >= 0.0 {
-                    blend(canvas, px as u32, py as u32, share);
-                }
-            });
-        }
-        x += advance;
-    }
-}
-
-fn blend(canvas: &mut RgbImage, x: u32, y: u32, share: f32) {
-    if let Some(pixel) = canvas.get_pixel_mut_checked(x, y) {
-        let mix = |(paper, ink): (u8, u8)| {
-            (f32::from(paper) * (1.0 - share) + f32::from(ink) * share).round() as u8
-        };
-        *pixel = Rgb([0, 1, 2].map(|i| mix((pixel.0[i], INK.0[i]))));
-    }
 }
