@@ -1,6 +1,7 @@
 //! Tags in an image: the AprilTag 3 library (Wang and Olson, *AprilTag 2: Efficient and robust fiducial detection*, IROS
 //! 2016), behind an interface that other ways to find tags can share.
 
+mod noise;
 mod settings;
 
 use std::ptr::NonNull;
@@ -128,7 +129,15 @@ impl Detector {
         library.refine_edges = settings.refine_edges;
         library.decode_sharpening = settings.decode_sharpening;
         library.qtp.min_cluster_pixels = settings.min_cluster_pixels as i32;
-        library.qtp.min_white_black_diff = settings.min_white_black_diff as i32;
+    }
+
+    /// What is searched for tags: what has more contrast than noise alone. The library looks at the range of 144 pixels,
+    /// which for normal noise is 5.3 ± 0.7 standard deviations.
+    fn set_contrast(&mut self, image: &Luma) {
+        let above_noise = || (6.3 * noise::noise(image)).clamp(5.0, 40.0) as u32;
+        let diff = self.settings.min_white_black_diff.unwrap_or_else(above_noise);
+        // SAFETY: alive, and nobody else knows it.
+        unsafe { self.library.0.as_mut() }.qtp.min_white_black_diff = diff as i32;
     }
 
     /// Whether the library writes to the image that it is given.
@@ -160,6 +169,7 @@ impl FindTags for Detector {
         if (width_px.min(height_px) as f32) < MIN_SIDE_PX as f32 * self.settings.decimate {
             return Ok(Vec::new());
         }
+        self.set_contrast(image);
         // A part of an image is copied as well: the library's own images have rows as long as the given one's.
         let copied = self.writes() || image.stride_bytes() > 2 * width_px;
         let (bytes, stride) = if copied {

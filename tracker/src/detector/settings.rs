@@ -23,8 +23,9 @@ pub struct DetectorSettings {
     pub max_hamming: u32,
     /// Outlines of fewer pixels are none, 1 to 10⁶. Higher: faster, small tags are lost.
     pub min_cluster_pixels: u32,
-    /// White must be this much brighter than black, in codes, 0 to 255. Higher: faster, tags of low contrast are lost.
-    pub min_white_black_diff: u32,
+    /// White must be this much brighter than black, in codes, 0 to 255. Higher: faster, tags of low contrast are lost. `None`:
+    /// so much that noise alone is not searched for tags.
+    pub min_white_black_diff: Option<u32>,
 }
 
 impl Default for DetectorSettings {
@@ -38,7 +39,7 @@ impl Default for DetectorSettings {
             decode_sharpening: 0.25,
             max_hamming: 2,
             min_cluster_pixels: 5,
-            min_white_black_diff: 5,
+            min_white_black_diff: None,
         }
     }
 }
@@ -103,7 +104,13 @@ impl DetectorSettings {
         range("decode_sharpening", self.decode_sharpening, 0.0, 4.0, "0 to 4")?;
         range("max_hamming", f64::from(self.max_hamming), 0.0, 2.0, "0 to 2")?;
         range("min_cluster_pixels", f64::from(self.min_cluster_pixels), 1.0, 1e6, "1 to 1000000")?;
-        range("min_white_black_diff", f64::from(self.min_white_black_diff), 0.0, 255.0, "0 to 255")?;
+        range(
+            "min_white_black_diff",
+            f64::from(self.min_white_black_diff.unwrap_or(0)),
+            0.0,
+            255.0,
+            "0 to 255",
+        )?;
         if self.families.is_empty() {
             return Err(DetectorError::Families("none is given".into()));
         }
