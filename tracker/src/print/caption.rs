@@ -29,10 +29,11 @@ pub(super) fn text(spec: &PrintSpec, grid: &TagGrid) -> String {
         false => "between detected corners, the outer edge of the black square",
     };
     format!(
-        "{} {name} {}{order}: {} mm {edge}{pitch}. Print at 100 %, not fitted to the page, and measure the ruler. {PROGRAM}",
+        "{} {name} {}{order}: {} mm {edge}{pitch}. Print at 100 %, not fitted to the page, and measure the ruler. {}",
         spec.family,
         ids(&spec.ids),
-        millimeters(grid.size_mm)
+        millimeters(grid.size_mm),
+        PROGRAM.replace(' ', "\u{a0}")
     )
 }
 

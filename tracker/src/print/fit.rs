@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::grid::{TagGrid, millimeters, snapped};
-use super::paper::Paper;
+use super::paper::{Paper, SIDES_MM};
 use super::ruler::{self, RULER_MM, STEP_MM};
 use super::{PrintError, PrintSpec, caption};
 
@@ -73,6 +73,10 @@ pub(super) fn place(spec: &PrintSpec, content: Content<'_>) -> Result<Place, Pri
         Paper::Sheet { size_mm, .. } => *size_mm,
         Paper::Fit => fitting_paper(spec, content),
     };
+    // The limit of PDF pages is 5080 mm.
+    if let Some(value) = size_mm.into_iter().find(|side| !SIDES_MM.contains(side)) {
+        return Err(PrintError::Length { name: "paper", value, allowed: "20 to 5000 mm a side" });
+    }
     let least_mm = 2.0 * spec.margin_mm + ruler::WIDTH_BESIDE_MM + 2.0 * STEP_MM;
     if size_mm[0] < least_mm {
         return Err(PrintError::NoRuler { width_mm: size_mm[0], margin_mm: spec.margin_mm, least_mm });

@@ -16,7 +16,7 @@ const NAMED: [(&str, [f64; 2]); 9] = [
     ("tabloid", [279.4, 431.8]),
 ];
 /// The shortest and longest side, millimetres.
-const SIDES_MM: std::ops::RangeInclusive<f64> = 20.0..=5000.0;
+pub(super) const SIDES_MM: std::ops::RangeInclusive<f64> = 20.0..=5000.0;
 
 /// What is printed on.
 #[derive(Clone, Debug, PartialEq)]

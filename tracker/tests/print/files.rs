@@ -19,13 +19,19 @@ fn sheets() -> Vec<Sheet> {
     Family::ALL.iter().map(|family| Sheet::new(&spec(*family)).unwrap()).collect()
 }
 
-/// Points of all contours in order, those of quadratic curves without control points.
-fn ends_mm(drawing: &Drawing) -> Vec<[f64; 2]> {
-    let contours = drawing.paths.iter().flat_map(|path| &path.contours);
-    let points = contours.flat_map(|contour| {
-        std::iter::once(contour.start_mm).chain(contour.segments.iter().map(Segment::end_mm))
-    });
-    points.collect()
+/// Points of all contours in order, control points of curves too.
+fn points_mm(drawing: &Drawing) -> Vec<[f64; 2]> {
+    let mut points = Vec::new();
+    for contour in drawing.paths.iter().flat_map(|path| &path.contours) {
+        points.push(contour.start_mm);
+        for segment in &contour.segments {
+            match *segment {
+                Segment::Line(end) => points.push(end),
+                Segment::Quadratic(control, end) => points.extend([control, end]),
+            }
+        }
+    }
+    points
 }
 
 fn assert_near(found: &[[f64; 2]], expected: &[[f64; 2]], tolerance: f64) {
@@ -41,22 +47,16 @@ fn svg_says_what_is_drawn() {
     for sheet in sheets() {
         let svg = sheet.drawing.to_svg();
         assert!(svg.contains("width=\"210mm\" height=\"297mm\" viewBox=\"0 0 210 297\""), "{}", &svg[..300]);
-        let mut ends = Vec::new();
+        let mut points = Vec::new();
         for data in svg.split(" d=\"").skip(1) {
             let data = data.split('"').next().unwrap();
-            for piece in data.split_inclusive(|c: char| c.is_ascii_alphabetic()) {
-                let numbers: Vec<f64> = piece
-                    .trim_end_matches(|c: char| c.is_ascii_alphabetic())
-                    .split_whitespace()
-                    .map(|number| number.parse().unwrap())
-                    .collect();
-                if let [.., x, y] = *numbers {
-                    ends.push([x, y]);
-                }
-            }
+            let numbers =
+                data.split(|c: char| c.is_ascii_alphabetic() || c == ' ').filter(|part| !part.is_empty());
+            let numbers: Vec<f64> = numbers.map(|number| number.parse().unwrap()).collect();
+            points.extend(numbers.chunks(2).map(|point| [point[0], point[1]]));
         }
         // Five decimals.
-        assert_near(&ends, &ends_mm(&sheet.drawing), 0.8e-5);
+        assert_near(&points, &points_mm(&sheet.drawing), 0.8e-5);
         // Crisp edges for all but letters.
         let straight = svg.matches("crispEdges").count();
         let letters = svg.lines().filter(|line| line.contains(" d=\"") && line.contains('Q')).count();
@@ -88,25 +88,36 @@ fn pdf_says_what_is_drawn() {
         let media = text.split_once("/MediaBox [").unwrap().1.split(']').next().unwrap();
         let media: Vec<f64> = media.split_whitespace().map(|number| number.parse().unwrap()).collect();
         assert_near(&[[media[2], media[3]]], &[[210.0 / 25.4 * 72.0, 297.0 / 25.4 * 72.0]], 1e-4);
-        let mut ends_points = Vec::new();
+        let mut points = Vec::new();
         let (mut numbers, mut matrix): (Vec<f64>, Vec<f64>) = Default::default();
         for word in content(&pdf).split_whitespace() {
             match word {
                 "cm" => matrix = std::mem::take(&mut numbers),
-                "m" | "l" | "c" => {
-                    let [.., x, y] = *numbers else { panic!("{word}") };
-                    let to = |a: usize| matrix[a] * x + matrix[a + 2] * y + matrix[a + 4];
-                    ends_points.push([to(0), to(1)]);
-                    numbers.clear();
+                "m" | "l" => points.push([numbers[0], numbers[1]]),
+                "c" => {
+                    let from: [f64; 2] = *points.last().unwrap();
+                    let [x1, y1, x2, y2, x, y] = *numbers else { panic!("{numbers:?}") };
+                    // The quadratic's control point, from either of the cubic's.
+                    let first = [(3.0 * x1 - from[0]) / 2.0, (3.0 * y1 - from[1]) / 2.0];
+                    let second = [(3.0 * x2 - x) / 2.0, (3.0 * y2 - y) / 2.0];
+                    assert_near(&[first], &[second], 2e-4);
+                    points.extend([first, [x, y]]);
                 }
-                "f" | "g" | "h" => numbers.clear(),
-                number => numbers.push(number.parse().unwrap()),
+                "f" | "g" | "h" => {}
+                number => {
+                    numbers.push(number.parse().unwrap());
+                    continue;
+                }
             }
+            numbers.clear();
         }
-        let ends: Vec<[f64; 2]> =
-            ends_points.iter().map(|[x, y]| [x / 72.0 * 25.4, 297.0 - y / 72.0 * 25.4]).collect();
+        let points: Vec<[f64; 2]> = points
+            .iter()
+            .map(|[x, y]| [0, 1].map(|a| matrix[a] * x + matrix[a + 2] * y + matrix[a + 4]))
+            .map(|[x, y]| [x / 72.0 * 25.4, 297.0 - y / 72.0 * 25.4])
+            .collect();
         // Numbers are of single precision: 297 mm have a step of 3e-5 mm.
-        assert_near(&ends, &ends_mm(&sheet.drawing), 1e-4);
+        assert_near(&points, &points_mm(&sheet.drawing), 1e-4);
     }
 }
 
@@ -124,7 +135,7 @@ fn cross_references_of_a_pdf_lead_to_its_objects() {
 }
 
 /// Width, height, grey levels and pixels per metre.
-fn decoded(file: &[u8]) -> (usize, usize, Vec<u8>, u32) {
+pub fn decoded(file: &[u8]) -> (usize, usize, Vec<u8>, u32) {
     let mut reader = png::Decoder::new(std::io::Cursor::new(file)).read_info().unwrap();
     let mut levels = vec![0; reader.output_buffer_size().unwrap()];
     let frame = reader.next_frame(&mut levels).unwrap();

@@ -169,6 +169,10 @@ fn mistakes_are_told() {
         (PrintSpec { px_per_m: Some(1000), size_mm: 12.0, ..spec() }, "choose a size of 8 or 16 mm"),
         (PrintSpec { paper: paper("40x200"), ids: vec![0], columns: 1, ..spec() }, "holds no ruler"),
         (PrintSpec { margin_mm: 100.0, ..spec() }, "room for"),
+        (
+            PrintSpec { size_mm: 2000.0, gap_mm: None, paper: Paper::Fit, ..spec() },
+            "paper: 10021 is out of range",
+        ),
     ] {
         let told = told(spec);
         assert!(told.contains(message), "{message} in: {told}");
