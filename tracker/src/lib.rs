@@ -11,7 +11,7 @@
 //! | [`planar`] | both poses of a single tag |
 //! | [`pose`] | the pose of a body in one image |
 //! | [`lie`] | exponential and logarithm of rigid motions |
-//! | [`print`] | tags on paper: PDF, SVG, PNG |
+//! | [`mod@print`] | tags on paper: PDF, SVG, PNG |
 
 pub mod bitmap;
 pub mod board;
