@@ -7,9 +7,9 @@ use crossbeam_channel::{Receiver, RecvTimeoutError, SendTimeoutError, Sender, bo
 
 use super::{POLL, Shared};
 
-/// Values that may wait where none may be lost: enough that neither side waits for the other's next step, few enough
-/// that frames do not pile up.
-const QUEUE: usize = 4;
+/// Values that may wait between a writer and a reader where none may be lost: none, for what waits is late. The writer holds
+/// the next one ready while the reader works.
+const QUEUE: usize = 0;
 
 /// What a slow reader gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -16,8 +16,8 @@
 //!
 //! **Newest or every frame.** A live camera goes on whether or not its frames are taken, so its frames go through
 //! mailboxes that overwrite: the pose that comes out is of the newest frame, never of a queue. A file waits for its
-//! reader, so nothing need be lost: its frames go through short queues that block. [`Handover`] says which; the pipeline is
-//! otherwise the same.
+//! reader, so nothing need be lost: its frames are handed from thread to thread, each waiting for the next. [`Handover`]
+//! says which; the pipeline is otherwise the same.
 //!
 //! **What goes wrong.** A camera that vanishes, or whose driver panics, is opened again with growing pauses
 //! ([`Retry::UntilStopped`]), or ends the pipeline with an error ([`Retry::Never`]: a file that is read a second time would

@@ -83,7 +83,7 @@ impl Bodies {
         Ok(Self { list, anchor })
     }
 
-    /// Boards and single tags, none of which is the world's.
+    /// Boards and single tags; the first of them lies flat at the world's origin.
     ///
     /// # Errors
     /// A file that is no board; a tag that is in two bodies.
@@ -96,7 +96,10 @@ impl Bodies {
         for &(tag, size_m) in tags {
             wanted.push(Wanted { body: Body::single(tag, size_m), by: format!("--tag {tag}") });
         }
-        Ok(Self { list: disjoint(wanted)?, anchor: None })
+        let first = wanted.first().map(|wanted| wanted.body.clone());
+        let list = disjoint(wanted)?;
+        let anchor = first.and_then(|first| Anchor::find(&list, &first, Isometry3::identity()));
+        Ok(Self { list, anchor })
     }
 }
 

@@ -50,7 +50,7 @@ pub struct Args {
     /// Calibration file of the source, unless it brings its own
     #[arg(long, value_name = "TOML")]
     calibration: Option<PathBuf>,
-    /// A board to find in the source (repeat for more)
+    /// A board to find in the source (repeat for more). The first body named lies flat at the world's origin
     #[arg(long, value_name = "TOML")]
     board: Vec<PathBuf>,
     /// A single tag to find in the source, such as tag36h11:7:0.05, its size in metres (repeat for more)
@@ -86,7 +86,7 @@ pub struct Args {
     #[arg(short, long, value_name = "PNG|FOLDER")]
     output: Option<PathBuf>,
     /// Print one JSON object: `input`; `frames`, each with `frame`, `captured_ns`, `latency_ms` (from the frame being there
-    /// to the end of its tracking), `world_from_camera` (null without anchor), `bodies` (`name`, `camera_from_body`,
+    /// to the end of its tracking; with files, it waits for the frame before), `world_from_camera` (null while the anchor is not seen), `bodies` (`name`, `camera_from_body`,
     /// `measured_camera_from_body` without filter, `position_std_mm` and `rotation_std_deg` along and about the camera's
     /// axes, `rms_px`, `reduced_chi2` (about 1 if lens and body are right), `certainty` (`clear`; `by_past`: another pose
     /// fits as well, and earlier frames decided; `ambiguous`: nothing decides), `other_camera_from_body` (null if clear),
