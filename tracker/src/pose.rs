@@ -99,13 +99,14 @@ pub enum PoseError {
     },
 }
 
+/// The first few in words.
 fn list(rejected: &[Rejected]) -> String {
-    let mut text = String::new();
-    for (i, Rejected { tag, reason, .. }) in rejected.iter().enumerate() {
-        text += &format!("{}{tag}: {reason}", if i == 0 { " (" } else { "; " });
+    const SHOWN: usize = 5;
+    let shown = rejected.iter().take(SHOWN).map(|Rejected { tag, reason, .. }| format!("{tag}: {reason}"));
+    let shown: Vec<String> = shown.collect();
+    match rejected.len() {
+        0 => String::new(),
+        1..=SHOWN => format!(" ({})", shown.join("; ")),
+        count => format!(" ({}; and {} more)", shown.join("; "), count - SHOWN),
     }
-    if !text.is_empty() {
-        text.push(')');
-    }
-    text
 }

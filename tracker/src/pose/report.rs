@@ -5,6 +5,7 @@ use std::fmt;
 use nalgebra::{Isometry3, Matrix6};
 
 use super::chi_squared::{ONE_IN_1E3, ONE_IN_1E6, limit};
+use super::mirror::angle_rad;
 use crate::detection::TagId;
 use crate::planar::PlanarError;
 
@@ -154,4 +155,13 @@ pub struct BodyPose {
     pub rejected: Vec<Rejected>,
     /// Set if its tags fit so badly that the body's description or the lens must be wrong.
     pub misfit: Option<Misfit>,
+}
+
+impl BodyPose {
+    /// The rotation between the pose and the other one that might be true, if there is one: a tag that nearly faces the
+    /// camera is ambiguous by a few degrees, which noise would make anyway; a small one that leans, by tens of degrees.
+    pub fn ambiguity_rad(&self) -> Option<f64> {
+        let other = self.certainty.other()?;
+        Some(angle_rad(&self.estimate.camera_from_body, &other.camera_from_body))
+    }
 }

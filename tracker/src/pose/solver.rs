@@ -21,7 +21,7 @@ use crate::planar::{PlanarError, planar_starts};
 /// Tags whose planar poses are tried as starts: more only help if as many are wrong.
 const STARTING_TAGS: usize = 4;
 /// Starts that are followed until tags agree.
-const STARTS_FOLLOWED: usize = 4;
+const STARTS_FOLLOWED: usize = 3;
 /// Starts that turn this far from a pose may lead to another.
 const OTHER_START_RAD: f64 = 0.1;
 
@@ -203,7 +203,9 @@ impl Scene<'_> {
         let mut best: Option<Consensus> = None;
         for start in starts.iter().take(STARTS_FOLLOWED) {
             let Some(found) = self.widened(allowed, agree(&self.imaging, &targets, start)) else { continue };
-            let fits = self.estimate(&found.fit, &found.weights).is_some_and(|pose| !pose.fits_badly());
+            let fits = self
+                .estimate(&found.fit, &found.weights)
+                .is_some_and(|pose| Misfit::of(&pose, self.mean_side_px(&found)).is_none());
             let better = best
                 .as_ref()
                 .is_none_or(|best| (found.used(), -found.fit.chi2) > (best.used(), -best.fit.chi2));

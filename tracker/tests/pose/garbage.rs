@@ -123,7 +123,7 @@ fn damaged_observations_give_poses_or_errors() {
         1e7,
         300.0,
     ];
-    for round in 0..3000 {
+    for round in 0..1000 {
         let truth =
             facing(&sight(&pinhole(), 100.0, &mut random), random.between(0.1, 2.0), 0.5, &mut random);
         let mut seen = observe(&pinhole(), &body, &truth, 0.1, &mut random);
