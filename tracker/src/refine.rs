@@ -168,11 +168,6 @@ impl Refiner {
         Self { lens, light, settings, templates: HashMap::new(), samples: Vec::new() }
     }
 
-    /// The settings, to be changed between images.
-    pub fn settings_mut(&mut self) -> &mut RefineSettings {
-        &mut self.settings
-    }
-
     /// Refines corners that are right to about a cell of the tag.
     ///
     /// # Errors
@@ -182,6 +177,30 @@ impl Refiner {
         image: &Luma,
         tag: TagId,
         corners_px: &[Vector2<f64>; 4],
+    ) -> Result<Refined, RefineError> {
+        self.refine_with(image, tag, corners_px, self.settings)
+    }
+
+    /// As [`refine`](Self::refine), looking at another number of pixels: to follow a tag fast.
+    ///
+    /// # Errors
+    /// As [`refine`](Self::refine).
+    pub fn refine_near(
+        &mut self,
+        image: &Luma,
+        tag: TagId,
+        corners_px: &[Vector2<f64>; 4],
+        max_pixels: usize,
+    ) -> Result<Refined, RefineError> {
+        self.refine_with(image, tag, corners_px, RefineSettings { max_pixels, ..self.settings })
+    }
+
+    fn refine_with(
+        &mut self,
+        image: &Luma,
+        tag: TagId,
+        corners_px: &[Vector2<f64>; 4],
+        settings: RefineSettings,
     ) -> Result<Refined, RefineError> {
         if corners_px.iter().flatten().any(|coordinate| !coordinate.is_finite()) || !is_front(corners_px) {
             return Err(RefineError::Corners(tag));
@@ -194,7 +213,7 @@ impl Refiner {
         let mut fit =
             Fit::start(template, &chart, corners_px, START_BLUR_PX).ok_or(RefineError::Corners(tag))?;
         // Which pixels speak, and how loudly, depends on blur and noise, which a first, coarse fit finds.
-        for stage in [Stage::coarse(&self.settings), Stage::fine(&self.settings)] {
+        for stage in [Stage::coarse(&settings), Stage::fine(&settings)] {
             collect(&mut self.samples, image, &self.light, &chart, &fit, stage.max_pixels)
                 .ok_or(RefineError::Corners(tag))?;
             let pixels = self.samples.len();
@@ -206,10 +225,10 @@ impl Refiner {
         let pixels = self.samples.len();
         let Fitted { corners_px, covariance_px2, blur_px, contrast, residual, explained, iterations } =
             fit.finish(&self.samples)?;
-        if explained.is_nan() || explained < self.settings.min_explained {
+        if explained.is_nan() || explained < settings.min_explained {
             return Err(RefineError::Unlike { tag, explained });
         }
-        let floor = SMatrix::<f64, 8, 8>::identity() * self.settings.floor_px.powi(2);
+        let floor = SMatrix::<f64, 8, 8>::identity() * settings.floor_px.powi(2);
         let observation = TagObservation { tag, corners_px, covariance_px2: covariance_px2 + floor };
         Ok(Refined { observation, blur_px, contrast, residual, explained, pixels, iterations })
     }

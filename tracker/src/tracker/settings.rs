@@ -1,0 +1,37 @@
+//! How a tracker works.
+
+use std::time::Duration;
+
+use crate::detector::DetectorSettings;
+use crate::refine::RefineSettings;
+
+/// How a tracker works.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrackerSettings {
+    /// How tags are found.
+    pub detector: DetectorSettings,
+    /// How the corners of tags just found are refined.
+    pub refine: RefineSettings,
+    /// Look for tags only where they should be, and in the whole image now and then.
+    pub regions: bool,
+    /// With `regions`: pixels that are looked at on a tag that is followed. Higher: more exact. Lower: faster.
+    pub follow_pixels: usize,
+    /// With `regions`: time from one search of the whole image to the next. Higher: less work. Lower: what is new in view is
+    /// found sooner.
+    pub search_every: Duration,
+    /// Take jitter out of poses.
+    pub filter: bool,
+}
+
+impl Default for TrackerSettings {
+    fn default() -> Self {
+        Self {
+            detector: DetectorSettings::default(),
+            refine: RefineSettings::default(),
+            regions: true,
+            follow_pixels: 1500,
+            search_every: Duration::from_millis(150),
+            filter: true,
+        }
+    }
+}
