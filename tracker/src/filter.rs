@@ -18,7 +18,18 @@
 //!
 //! What is left of the overlay error, measured by `cargo run -p coshade-tracker --example filter`:
 //!
-//! FIGURES
+//! | motion | filtered / unfiltered | 1€ filter |
+//! | --- | --- | --- |
+//! | at rest | 0.41 | 0.33 |
+//! | steady, 0.01 to 0.5 px/frame | 0.47 to 0.48 | 0.48 to 6.9 |
+//! | steady, 10 px/frame, turning round at the picture's edge | 0.70 | 20 |
+//! | a second of rest, a second at 1 px/frame | 0.74 | 7.5 |
+//! | tremor of 0.2 px, 1 to 12 Hz | 0.73 to 0.99 | 1.6 to 2.4 |
+//! | tremor of 2 px, 1 to 12 Hz | 1.00 | 7.8 to 15 |
+//! | worst of 93 motions at 30 and 10 frames/s, noise 1/3, 1 and 3 times what is said | 1.004 | |
+//!
+//! The theorem is about one step with noise of a known size. For the chain, whose biases add, and for a measured size,
+//! the last row is what holds.
 
 mod line;
 mod noise;

@@ -12,7 +12,8 @@ use super::Point;
 const MEMORY: f64 = 100.0;
 /// What the solver's own word weighs at the start, in differences.
 const PRIOR: f64 = 4.0;
-/// The mean of the three smallest eigenvalues, of white noise of variance 1 (measured in a test below).
+/// The mean of the three smallest eigenvalues, of white noise of variance 1 (found by simulation; `the_noise_scale_is_found`
+/// tests it).
 const SMALLEST_OF_WHITE: f64 = 0.74;
 /// One difference counts as this many mean squares at most.
 const CLIP: f64 = 4.0;

@@ -1,5 +1,7 @@
 //! The filter against simulated poses of one tag: calm at rest, never worse in motion.
 
+#![allow(clippy::unwrap_used, reason = "simulated numbers of known properties")]
+
 mod simulation;
 
 use coshade_capture::Timestamp;
