@@ -2,7 +2,7 @@
 
 use anyhow::{Context as _, bail};
 use coshade_capture::{Converter, Frame, LatestError, Timestamp, clock};
-use coshade_tracker::Luma;
+use coshade_tracker::{Luma, Tracker, Tracking};
 
 use super::event::{Reporter, Severity};
 use super::handover::{Inlet, Outlet};
@@ -20,6 +20,14 @@ pub trait Track: Send {
 
     /// What is in `image`, the middle of whose exposure was `captured`.
     fn track(&mut self, image: &Luma<'_>, captured: Timestamp) -> Self::Tracking;
+}
+
+impl Track for Tracker {
+    type Tracking = Tracking;
+
+    fn track(&mut self, image: &Luma<'_>, captured: Timestamp) -> Tracking {
+        Self::track(self, image, captured)
+    }
 }
 
 /// A frame and what was found in that very frame.

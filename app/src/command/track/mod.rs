@@ -1,8 +1,8 @@
 //! `coshade track`: where tags and bodies are in the frames of a camera.
 
 mod bodies;
-mod engine;
 mod input;
+mod measured;
 mod output;
 mod rows;
 mod summary;
@@ -14,14 +14,14 @@ use std::time::Duration;
 
 use anyhow::anyhow;
 use coshade_capture::LatestError;
-use coshade_tracker::{Family, TagId};
+use coshade_tracker::detector::DetectorSettings;
+use coshade_tracker::{Family, TagId, Tracker, TrackerSettings};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::print;
 use crate::interrupt;
 use crate::pipeline::{Event, Finished, Handover, Options, Pipeline, Retry, Severity};
 use bodies::Bodies;
-use engine::Settings;
 use input::{Beside, Input};
 use output::Output;
 use summary::{EventRow, Summary, Tally};
@@ -85,16 +85,25 @@ pub struct Args {
     /// NUMBER.png
     #[arg(short, long, value_name = "PNG|FOLDER")]
     output: Option<PathBuf>,
-    /// Print one JSON object: `input`; `frames`, each with `frame`, `captured_ns`, `latency_ms` (from the frame being there
-    /// to the end of its tracking; with files, it waits for the frame before), `world_from_camera` (null while the anchor is not seen), `bodies` (`name`, `camera_from_body`,
-    /// `measured_camera_from_body` without filter, `position_std_mm` and `rotation_std_deg` along and about the camera's
-    /// axes, `rms_px`, `reduced_chi2` (about 1 if lens and body are right), `certainty` (`clear`; `by_past`: another pose
-    /// fits as well, and earlier frames decided; `ambiguous`: nothing decides), `other_camera_from_body` (null if clear),
-    /// `tags_used`, `tags_rejected`), `tags` (`family`, `id`, `corners_px`, `hamming`, `margin`, `poses`: both poses of a tag
-    /// of known size with their `rms_px`) and `warnings`; `bodies` and `tags` with counts over all frames (`jumps`: times
-    /// that a measured rotation changed by more than 30° between neighbouring frames); `pipeline` with counters, `latency_ms`,
-    /// `capture_latency_ms` (from the middle of the exposure; live cameras), `track_ms` and CPU times; `events`. Poses have
-    /// `position_m`, `quaternion_xyzw` and `rotation_deg`
+    /// Print one JSON object.
+    /// `input`: the session or source.
+    /// `frames`: for each frame `frame` (its number), `captured_ns` (middle of the exposure), `latency_ms` (from the frame
+    /// being there to the end of its tracking; a file's frame may wait for the one before), `searched` (the whole image was
+    /// searched), `world_from_camera` (null while the anchor is not seen), `bodies`, `tags`, `warnings`.
+    /// `bodies` of a frame: `name`, `camera_from_body`, `measured_camera_from_body` (without filter), `position_std_mm` and
+    /// `rotation_std_deg` (along and about the camera's axes), `rms_px` (corners to where the pose puts them), `reduced_chi2`
+    /// (about 1 if lens and body are right), `certainty` (`clear`; `by_past`: another pose fits as well, and earlier frames
+    /// decided; `ambiguous`: nothing decides), `other_camera_from_body` (null if clear), `tags_used`, `tags_rejected`.
+    /// `tags` of a frame: `family`, `id`, `corners_px` (lower left, lower right, upper right, upper left of the print; the
+    /// first pixel's centre is 0, 0), `hamming` (corrected bits) and `margin` (contrast of the bits, codes), both null if the
+    /// tag was followed from the frame before, `poses` (both poses of a tag of known size, `camera_from_tag` and `rms_px`).
+    /// Poses: `position_m`, `quaternion_xyzw`, and the same rotation as `rotation_deg`.
+    /// `bodies` and `tags` of all frames: `frames` (in how many), `certainty` (how many of each), `jumps` (times that a
+    /// measured rotation changed by more than 30 degrees between neighbouring frames), `frames_with_rejected_tags`, `rms_px`.
+    /// `pipeline`: `elapsed_s`, `frames_in`, `tracked`, `tracked_per_s`, `overwritten` (before tracking), `unread` (behind it),
+    /// `missing` (by number), `damaged`, `stalls`, `lost`, `restarts`, `events_dropped`, `latency_ms`, `capture_latency_ms`
+    /// (from the middle of the exposure; live cameras), `track_ms`, `camera_cpu_s`, `tracker_cpu_s`.
+    /// `events`: `at_s`, `thread`, `severity`, `message`.
     #[arg(long, verbatim_doc_comment, conflicts_with = "json_lines")]
     json: bool,
     /// Print a line of JSON for each frame as it comes, as in `frames` of --json, and at the end the rest
@@ -110,14 +119,23 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         tags: &args.tag,
         live: args.live,
     };
-    let Input { name, source, calibration, bodies, filter: _ } = Input::open(&args.input, &beside)?;
-    let settings =
-        Settings { families: families(args, &bodies), decimate: args.decimate, threads: args.threads };
+    let Input { name, source, calibration, bodies, filter } = Input::open(&args.input, &beside)?;
+    let settings = TrackerSettings {
+        detector: DetectorSettings {
+            families: families(args, &bodies),
+            decimate: args.decimate,
+            threads: args.threads,
+            ..DetectorSettings::default()
+        },
+        regions: !args.full_frame,
+        filter: filter && !args.no_filter,
+        ..TrackerSettings::default()
+    };
     let mut output = Output::new(args, &calibration, &bodies)?;
     let stop = interrupt::on_ctrl_c()?;
     let (is_live, lens, list) = (args.live || source.camera.is_live(), calibration, bodies.list.clone());
-    let mut pipeline =
-        Pipeline::start(source, move || engine::new(&lens, &list, &settings), options(args, is_live))?;
+    let build = move || Ok(Tracker::new(&lens, &list, settings.clone())?);
+    let mut pipeline = Pipeline::start(source, build, options(args, is_live))?;
     let progress = progress(args);
     let mut tally = Tally::new(&bodies.list);
     let mut events = Vec::new();
@@ -128,7 +146,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             Err(LatestError::Timeout) => continue,
             Err(LatestError::Closed) => break,
         };
-        let row = engine::row(&tracked, bodies.anchor.as_ref());
+        let row = measured::row(&tracked, bodies.anchor.as_ref());
         tally.add(&row);
         output.frame(&tracked.frame, row)?;
         progress.inc(1);

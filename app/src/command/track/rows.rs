@@ -14,6 +14,8 @@ pub struct FrameRow {
     pub captured_ns: u64,
     /// From the moment the frame was there to the end of its tracking.
     pub latency_ms: f64,
+    /// Whether tags were looked for in the whole image.
+    pub searched: bool,
     /// Where the camera is in the world; null while the anchor is not seen.
     pub world_from_camera: Option<PoseRow>,
     /// Bodies found.
@@ -70,10 +72,10 @@ pub struct TagRow {
     pub id: u32,
     /// Lower left, lower right, upper right, upper left of the print; (0, 0) is the centre of the first pixel.
     pub corners_px: [[f64; 2]; 4],
-    /// Wrong bits that were corrected.
-    pub hamming: u32,
-    /// Mean difference of the bits' brightness from the threshold, codes.
-    pub margin: f32,
+    /// Wrong bits that were corrected; null if it was followed from an earlier frame.
+    pub hamming: Option<u32>,
+    /// Mean difference of the bits' brightness from the threshold, codes; null as above.
+    pub margin: Option<f32>,
     /// Both poses that a flat square can have, the better one first; empty if its size is unknown.
     pub poses: Vec<PlanarRow>,
 }
