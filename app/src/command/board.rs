@@ -231,7 +231,7 @@ fn notes(args: &Args, sheet: &Sheet) -> Vec<String> {
         notes.push("no numbers under the tags: between the white rings of two rows is no room".to_owned());
     }
     if sheet.upright_ruler_mm.is_none() {
-        notes.push("no upright ruler: beside the board is no room".to_owned());
+        notes.push("no upright ruler: beside and under the board is no room".to_owned());
     }
     notes
 }

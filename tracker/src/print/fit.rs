@@ -119,20 +119,21 @@ fn try_place(spec: &PrintSpec, content: Content<'_>, paper_mm: [f64; 2]) -> Resu
     }
     let centered = (paper_mm[0] - width) / 2.0;
     let beside_ruler = margin + ruler::UPRIGHT_MM;
-    let has_upright = beside_ruler + width <= border + room_mm[0];
-    let left = if has_upright { centered.max(beside_ruler) } else { centered };
+    let is_beside = beside_ruler + width <= border + room_mm[0];
+    let left = if is_beside { centered.max(beside_ruler) } else { centered };
     let top = border + (room_mm[1] - height) / 2.0;
-    let upright_mm = ruler::length_mm(footer_mm - SPACE_MM - margin - 2.0 * ruler::BEYOND_MM);
-    let upright_ruler_mm = upright_mm
-        .filter(|_| has_upright)
-        .map(|length| [footer_mm - SPACE_MM - ruler::BEYOND_MM - length, length]);
+    // Beside the board where there is room, else under it.
+    let highest = if is_beside { margin } else { top + height };
+    let lowest = footer_mm - SPACE_MM - ruler::BEYOND_MM;
+    let upright_ruler_mm =
+        ruler::length_mm(lowest - highest - ruler::BEYOND_MM).map(|length| [lowest - length, length]);
     // The caller has made sure that the paper is wide enough.
     let ruler_mm = ruler::length_mm(paper_mm[0] - 2.0 * margin - ruler::WIDTH_BESIDE_MM).ok_or(room_mm)?;
     let squares_mm = [left, top].map(|edge| snapped(spec.px_per_m, edge + grid.quiet_mm));
     Ok(Place { paper_mm, squares_mm, footer_mm, ruler_mm, upright_ruler_mm })
 }
 
-/// What would fit: the paper turned, larger paper, smaller tags.
+/// What would fit: the paper turned, or else larger paper; smaller tags.
 fn remedies(spec: &PrintSpec, content: Content<'_>, [width, height]: [f64; 2]) -> Vec<String> {
     let fits = |size_mm: [f64; 2]| try_place(spec, content, size_mm).is_ok();
     let turned =
@@ -145,7 +146,7 @@ fn remedies(spec: &PrintSpec, content: Content<'_>, [width, height]: [f64; 2]) -
         Paper::Fit => None,
     });
     let smaller = smaller_size(spec, content, [width, height]);
-    turned.into_iter().chain(larger).chain(smaller).collect()
+    turned.or(larger).into_iter().chain(smaller).collect()
 }
 
 /// The largest size, in tenths of a millimetre, at which the same tags fit with a gap of the same share.

@@ -95,7 +95,7 @@ impl TagGrid {
                 [meters(x + half - width / 2.0), meters(height / 2.0 - y - half)],
             )
         };
-        let notes = "As drawn, not measured: if 100 mm of the printed ruler are not 100 mm long, multiply all lengths.";
+        let notes = "As drawn, not measured: if 100 mm of the printed ruler measure L mm, multiply all lengths by L/100";
         Board {
             version: VERSION,
             family: spec.family,

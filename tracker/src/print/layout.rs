@@ -11,8 +11,8 @@ use super::text::{Anchor, Letters};
 use super::{PrintError, PrintSpec, caption, ruler};
 
 /// Numbers under tags: share of the tags' size, and limits of their letters.
-const LABEL_SHARE: f64 = 0.06;
-const LABEL_EM_MM: [f64; 2] = [1.5, 4.0];
+const LABEL_SHARE: f64 = 0.08;
+const LABEL_EM_MM: [f64; 2] = [1.5, 5.0];
 /// Height of a line of numbers, with space around, in units of its letters.
 const LABEL_LINE: f64 = 1.3;
 

@@ -12,6 +12,10 @@ fn the_board_of_the_desk_is_printed() {
     assert_eq!(sheet.board.family, desk.family);
     assert_eq!(sheet.board.tags, desk.tags);
     assert_eq!((sheet.ruler_mm, sheet.upright_ruler_mm), (100.0, Some(100.0)));
+    // On upright paper the upright ruler is under the board: (297 − 26 − 155) / 2 mm high, in whole centimetres.
+    let upright = Sheet::new(&PrintSpec { paper: paper("a4"), ..desk_board() }).unwrap();
+    assert_eq!((upright.ruler_mm, upright.upright_ruler_mm), (100.0, Some(50.0)));
+    assert_eq!(upright.board.tags, desk.tags);
     // Rings of 5.125 mm fill the gaps of 11 mm up to 0.75 mm.
     assert!(!sheet.has_labels);
 }
@@ -139,7 +143,8 @@ fn what_does_not_fit_is_told_with_what_would() {
     let wide =
         PrintSpec { size_mm: 60.0, gap_mm: Some(20.0), ids: vec![0, 1, 2], columns: 3, ..desk_board() };
     let told = Sheet::new(&PrintSpec { paper: paper("letter"), ..wide.clone() }).unwrap_err().to_string();
-    assert!(told.contains("it fits in landscape"), "{told}");
+    assert!(told.contains("it fits in landscape, or with a size of "), "{told}");
+    assert!(told.ends_with(" mm") && told.contains(" and a gap of "), "{told}");
     assert!(Sheet::new(&PrintSpec { paper: paper("letter").landscape(), ..wide }).is_ok());
 }
 
