@@ -3,6 +3,7 @@
 use std::hint::black_box;
 
 use coshade_lens::model::{CameraModel, ModelKind};
+use coshade_tracker::pose::Before;
 use coshade_tracker::{Body, BodyTag, Family, Past, PoseSolver, TagId, TagObservation, planar_poses};
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{Isometry3, SMatrix, Translation3, Vector2, Vector3};
@@ -18,10 +19,13 @@ fn board(columns: u32, rows: u32) -> Body {
     Body { name: "board".into(), tags: tags.collect() }
 }
 
+fn camera_from_body() -> Isometry3<f64> {
+    Translation3::new(0.05, 0.02, 0.5) * Isometry3::rotation(Vector3::new(2.7, 0.3, 0.2))
+}
+
 /// Corners with errors of about 0.1 px.
 fn observe(lens: &CameraModel, body: &Body) -> Vec<TagObservation> {
-    let turned = Isometry3::rotation(Vector3::new(2.7, 0.3, 0.2));
-    let camera_from_body = Translation3::new(0.05, 0.02, 0.5) * turned;
+    let camera_from_body = camera_from_body();
     let mut number = 0.0_f64;
     let mut error_px = || {
         number += 1.0;
@@ -56,6 +60,12 @@ fn poses(criterion: &mut Criterion) {
             let count = columns * rows;
             criterion.bench_function(&format!("{name}: body of {count} tags"), |bencher| {
                 bencher.iter(|| solver.solve(black_box(&seen), &Past::default()));
+            });
+            let Ok(rolling) = solver.clone().with_rolling_shutter(0.02, 720) else { continue };
+            let before = Before { camera_from_body: camera_from_body(), elapsed_s: 0.03 };
+            let past = Past { expected: None, before: Some(before) };
+            criterion.bench_function(&format!("{name}: rolling shutter, body of {count} tags"), |bencher| {
+                bencher.iter(|| rolling.solve(black_box(&seen), &past));
             });
             if count > 1 {
                 let mut wrong = seen.clone();

@@ -157,11 +157,13 @@ fn series(x: f64, coefficients: [f64; 6]) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c)
 }
 
-fn split(twist: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
+/// Rotation and translation of a twist.
+pub fn split(twist: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
     (twist.fixed_rows::<3>(0).into_owned(), twist.fixed_rows::<3>(3).into_owned())
 }
 
-fn join(rotation: &Vector3<f64>, translation: &Vector3<f64>) -> Vector6<f64> {
+/// A twist from its parts.
+pub fn join(rotation: &Vector3<f64>, translation: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(rotation.x, rotation.y, rotation.z, translation.x, translation.y, translation.z)
 }
 

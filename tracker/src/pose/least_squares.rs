@@ -9,9 +9,9 @@ use crate::lie;
 const CONVERGED: f64 = 1e-10;
 const FIRST_DAMPING: f64 = 1e-4;
 const MAX_DAMPING: f64 = 1e8;
-/// Poses further away than this many times a thing's extent are none: it would be far less than a pixel wide, and what
+/// Poses further away than this many times a thing's extent are none: it would be less than a pixel wide, and what
 /// leads there is nonsense that fits best as a point.
-const FURTHEST: f64 = 1e5;
+const FURTHEST: f64 = 1e4;
 
 /// What a fit may change, and how far it goes.
 #[derive(Clone, Copy, Debug)]
@@ -139,9 +139,10 @@ fn quadratic(
 ) -> Option<Quadratic> {
     let centre = (pose * nalgebra::Point3::from(*middle)).coords;
     let view = imaging.at(pose);
+    let pivot = view.about(&centre);
     let mut sum = Quadratic { chi2: 0.0, hessian: Matrix6::zeros(), gradient: Vector6::zeros(), centre };
     for (target, &weight) in targets.iter().zip(weights).filter(|(_, weight)| **weight > 0.0) {
-        let (residual, jacobian) = view.linearised(target, &centre)?;
+        let (residual, jacobian) = view.linearised(target, &pivot)?;
         sum.chi2 += weight * residual.norm_squared();
         sum.hessian += jacobian.tr_mul(&jacobian) * weight;
         sum.gradient += jacobian.tr_mul(&residual) * weight;

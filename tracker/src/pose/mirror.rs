@@ -28,14 +28,14 @@ pub(crate) fn mirrored_fit(
 ) -> Option<Fit> {
     let mirrored = mirrored(targets, weights, &best.camera_from_body)?;
     let fit = |start: &Isometry3<f64>, search| minimise(imaging, targets, weights, start, search);
-    let shifted = fit(&mirrored, Search::TRANSLATION)?;
+    let shifted = fit(&mirrored, Search { least_gain: Search::ROUGH.least_gain, ..Search::TRANSLATION })?;
     let rough = fit(&shifted.camera_from_body, Search::ROUGH)?;
     if rough.chi2 > HOPELESS * best.chi2.max(FEW) {
         return Some(rough);
     }
     let free = fit(&rough.camera_from_body, Search::FULL)?;
     let merged = angle_rad(&free.camera_from_body, &best.camera_from_body) < SAME_MINIMUM_RAD;
-    Some(if merged { shifted } else { free })
+    if merged { fit(&shifted.camera_from_body, Search::TRANSLATION) } else { Some(free) }
 }
 
 /// The rotation between two poses.

@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, Matrix6, Point3, SMatrix, SVector, Translation3, Vecto
 
 use super::rolling::{RowMotion, RowPose};
 use crate::detection::{TagId, TagObservation};
+use crate::lie;
 
 /// The corners of one tag in units of their errors.
 pub(crate) type Residual = SVector<f64, 8>;
@@ -50,7 +51,19 @@ pub(crate) struct View<'a> {
     rows: Option<RowPose>,
 }
 
+/// About what a pose is turned.
+pub(crate) struct Pivot {
+    centre: Vector3<f64>,
+    /// How what rows' poses depend on changes with the frame's pose.
+    unknown_by_pose: Option<Matrix6<f64>>,
+}
+
 impl<'a> Imaging<'a> {
+    /// With the motion that leads to a pose, for all poses alike.
+    pub fn moving_as_at(self, camera_from_body: &Isometry3<f64>) -> Self {
+        Self { motion: self.motion.map(|motion| motion.known(camera_from_body)), ..self }
+    }
+
     pub fn at(&self, camera_from_body: &Isometry3<f64>) -> View<'a> {
         let rows = self.motion.as_ref().map(|motion| motion.at(camera_from_body));
         View { lens: self.lens, camera_from_body: *camera_from_body, rows }
@@ -77,43 +90,41 @@ impl View<'_> {
         self.error_px(target).map_or(f64::INFINITY, |error| (target.whitening * error).norm_squared())
     }
 
-    /// The residual W (observed − expected), and its derivative by a twist that turns the body about `centre` (in the
-    /// camera's frame) and shifts it: `camera_from_body ← shift(centre) exp(δ) shift(−centre) camera_from_body`.
-    pub fn linearised(&self, target: &Target, centre: &Vector3<f64>) -> Option<(Residual, Jacobian)> {
+    /// Ready to be [`linearised`](Self::linearised) about a point in the camera's frame.
+    pub fn about(&self, centre: &Vector3<f64>) -> Pivot {
+        let there = Isometry3::from(Translation3::from(*centre));
+        let unknown_by_pose = self.rows.as_ref().map(|rows| rows.unknown_by_pose() * lie::adjoint(&there));
+        Pivot { centre: *centre, unknown_by_pose }
+    }
+
+    /// The residual W (observed − expected), and its derivative by a twist that turns the body about the pivot's centre
+    /// and shifts it: `camera_from_body ← shift(centre) exp(δ) shift(−centre) camera_from_body`.
+    pub fn linearised(&self, target: &Target, pivot: &Pivot) -> Option<(Residual, Jacobian)> {
         let mut error = Residual::zeros();
         let mut derivative = Jacobian::zeros();
         for (i, corner) in target.corners_m.iter().enumerate() {
-            let (pose, carried) = match &self.rows {
-                Some(rows) => rows.pose_and_derivative(target.times_s[i]),
-                None => (self.camera_from_body, Matrix6::identity()),
-            };
+            let moving = self.rows.as_ref().map(|rows| rows.pose_and_derivative(target.times_s[i]));
+            let pose = moving.as_ref().map_or(&self.camera_from_body, |(pose, _)| pose);
+            // Rows' twists are about the camera.
+            let centre = if moving.is_some() { Vector3::zeros() } else { pivot.centre };
             let point = (pose * corner).coords;
             let projected = self.lens.project_jacobian(&point)?;
             error.fixed_rows_mut::<2>(2 * i).copy_from(&(target.corners_px[i] - projected.px));
-            // Where rows move, their derivative is by a twist about the camera, which is then moved to the centre.
-            let pivot = if self.rows.is_some() { Vector3::zeros() } else { *centre };
             for axis in 0..2 {
-                let by_point = projected.d_px_d_point.row(axis).transpose();
-                let by_turn = (point - pivot).cross(&by_point);
-                let by_twist =
-                    Vector6::new(by_turn.x, by_turn.y, by_turn.z, by_point.x, by_point.y, by_point.z);
-                let by_pose = match &self.rows {
-                    Some(_) => about_centre(&(carried.transpose() * by_twist), centre),
-                    None => by_twist,
-                };
-                derivative.set_row(2 * i + axis, &-by_pose.transpose());
+                let by_shift = projected.d_px_d_point.row(axis).transpose();
+                let by_turn = (point - centre).cross(&by_shift);
+                let mut by_twist = lie::join(&by_turn, &by_shift);
+                if let Some((_, carried)) = &moving {
+                    by_twist = carried.tr_mul(&by_twist);
+                }
+                derivative.set_row(2 * i + axis, &-by_twist.transpose());
             }
+        }
+        if let Some(unknown_by_pose) = &pivot.unknown_by_pose {
+            derivative *= unknown_by_pose;
         }
         Some((target.whitening * error, target.whitening * derivative))
     }
-}
-
-/// A derivative by a twist about the camera's origin, as one by a twist about `centre`: `adjoint(shift(centre))ᵀ`
-/// applied to it.
-fn about_centre(by_twist: &Vector6<f64>, centre: &Vector3<f64>) -> Vector6<f64> {
-    let by_shift = by_twist.fixed_rows::<3>(3).into_owned();
-    let by_turn = by_twist.fixed_rows::<3>(0) - centre.cross(&by_shift);
-    Vector6::new(by_turn.x, by_turn.y, by_turn.z, by_shift.x, by_shift.y, by_shift.z)
 }
 
 /// `camera_from_body` after the twist of [`View::linearised`].
@@ -123,7 +134,7 @@ pub(crate) fn disturbed(
     twist: &Vector6<f64>,
 ) -> Isometry3<f64> {
     let there = Translation3::from(*centre);
-    let mut pose = there * crate::lie::exp(twist) * there.inverse() * camera_from_body;
+    let mut pose = there * lie::exp(twist) * there.inverse() * camera_from_body;
     pose.rotation.renormalize();
     pose
 }
@@ -155,17 +166,21 @@ mod tests {
         let times_s = [-0.01, -0.004, 0.006, 0.012];
         let target = Target::new(&observation, body.tags[0].corners_m(), times_s).unwrap();
         let before = crate::lie::exp(&Vector6::new(0.05, -0.1, 0.2, 0.04, 0.03, -0.02)) * pose;
-        let moving = RowMotion::new(&before, 0.03);
+        let since = RowMotion::Since { before, elapsed_s: 0.03 };
         let centre = pose.translation.vector;
         const STEP: f64 = 1e-6;
-        for motion in [None, Some(moving)] {
+        for motion in [None, Some(since), Some(since.known(&pose))] {
             let imaging = Imaging { lens: &lens, motion };
-            let (residual, jacobian) = imaging.at(&pose).linearised(&target, &centre).unwrap();
+            let linearised = |pose: &Isometry3<f64>| {
+                let view = imaging.at(pose);
+                view.linearised(&target, &view.about(&centre)).unwrap()
+            };
+            let (residual, jacobian) = linearised(&pose);
             assert!((residual.norm_squared() / imaging.at(&pose).square(&target) - 1.0).abs() < 1e-12);
             for i in 0..6 {
                 let at = |step: f64| {
                     let moved = disturbed(&pose, &centre, &Vector6::ith(i, step));
-                    imaging.at(&moved).linearised(&target, &centre).unwrap().0
+                    linearised(&moved).0
                 };
                 let slope = (at(STEP) - at(-STEP)) / (2.0 * STEP);
                 // Residuals of some 10³ in units of their errors are rounded to 10⁻¹³, their third derivatives are

@@ -55,6 +55,15 @@ struct Scene<'a> {
     rejected: Vec<Rejected>,
 }
 
+/// What fits best.
+struct BestTwo<'a> {
+    best: Consensus,
+    /// The rotation that fits second best, to the same observations.
+    other: Option<Fit>,
+    /// With the motion between rows that belongs to the best pose.
+    imaging: Imaging<'a>,
+}
+
 /// The second best pose.
 struct Rival {
     estimate: PoseEstimate,
@@ -99,9 +108,11 @@ impl PoseSolver {
         if scene.targets.is_empty() {
             return Err(PoseError::NoTag { body: self.name.clone(), rejected: scene.rejected });
         }
-        let no_fit = || PoseError::NoFit { body: self.name.clone(), tags: scene.targets.len() };
-        let everything = vec![true; scene.targets.len()];
-        let (best, other) = scene.best_two(&everything).ok_or_else(no_fit)?;
+        let tags = scene.targets.len();
+        let no_fit = || PoseError::NoFit { body: self.name.clone(), tags };
+        let everything = vec![true; tags];
+        let BestTwo { best, other, imaging } = scene.best_two(&everything).ok_or_else(no_fit)?;
+        scene.imaging = imaging;
         let estimate = scene.estimate(&best.fit, &best.weights).ok_or_else(no_fit)?;
         let (estimate, certainty, best) = match scene.rival(&best, other.as_ref()) {
             None => (estimate, Certainty::Clear, best),
@@ -137,7 +148,8 @@ impl PoseSolver {
 
     fn scene(&self, observations: &[TagObservation], past: &Past) -> Scene<'_> {
         let moving = past.before.filter(|_| self.row_s > 0.0);
-        let motion = moving.map(|before| RowMotion::new(&before.camera_from_body, before.elapsed_s));
+        let motion = moving
+            .map(|Before { camera_from_body: before, elapsed_s }| RowMotion::Since { before, elapsed_s });
         let imaging = Imaging { lens: &self.lens, motion };
         let mut scene = Scene { imaging, candidates: Vec::new(), targets: Vec::new(), rejected: Vec::new() };
         for (index, observation) in observations.iter().enumerate() {
@@ -166,22 +178,23 @@ impl PoseSolver {
     }
 }
 
-impl Scene<'_> {
-    /// The best pose, from the observations that are `allowed`, and the rotation that fits second best.
-    fn best_two(&self, allowed: &[bool]) -> Option<(Consensus, Option<Fit>)> {
+impl<'a> Scene<'a> {
+    /// The best poses, from the observations that are `allowed`.
+    fn best_two(&self, allowed: &[bool]) -> Option<BestTwo<'a>> {
         let starts = self.starts(allowed);
         let mut best = self.consensus(allowed, &starts)?;
-        let mut other = self.other(&best, &starts);
+        let imaging = self.imaging.moving_as_at(&best.fit.camera_from_body);
+        let mut other = self.other(&imaging, &best, &starts);
         if let Some(better) = other.filter(|other| other.chi2 < best.fit.chi2) {
             // The minimum that the starts led to was not the best one.
             let targets = self.allowed(allowed);
             other = Some(best.fit);
-            best = match self.widened(allowed, agree(&self.imaging, &targets, &better.camera_from_body)) {
+            best = match self.widened(allowed, agree(&imaging, &targets, &better.camera_from_body)) {
                 Some(wider) if wider.weights != best.weights => wider,
                 _ => Consensus { fit: better, weights: best.weights },
             };
         }
-        Some((best, other))
+        Some(BestTwo { best, other, imaging })
     }
 
     /// Planar poses of the largest tags, the one that fits all tags best first.
@@ -220,16 +233,16 @@ impl Scene<'_> {
     }
 
     /// The second best rotation, from the mirrored pose, and for bodies that are not flat from the starts as well.
-    fn other(&self, best: &Consensus, starts: &[Isometry3<f64>]) -> Option<Fit> {
+    fn other(&self, imaging: &Imaging<'_>, best: &Consensus, starts: &[Isometry3<f64>]) -> Option<Fit> {
         let Consensus { fit, weights } = best;
-        let mirrored = mirrored_fit(&self.imaging, &self.targets, weights, fit);
+        let mirrored = mirrored_fit(imaging, &self.targets, weights, fit);
         if is_flat(&self.targets, weights) {
             return mirrored;
         }
         let elsewhere = |pose: &Isometry3<f64>| angle_rad(pose, &fit.camera_from_body) > OTHER_START_RAD;
         let start = starts.iter().find(|start| elsewhere(start));
         let followed = start
-            .and_then(|start| minimise(&self.imaging, &self.targets, weights, start, Search::FULL))
+            .and_then(|start| minimise(imaging, &self.targets, weights, start, Search::FULL))
             .filter(|followed| elsewhere(&followed.camera_from_body));
         [mirrored, followed].into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
     }
@@ -240,7 +253,10 @@ impl Scene<'_> {
         let mirrored = other.and_then(|other| self.estimate(other, &best.weights));
         let mirrored = mirrored.map(|estimate| Rival { estimate, consensus: None });
         let contested = self.without_duplicated(best).and_then(|allowed| {
-            let (consensus, _) = self.best_two(&allowed).filter(|(rival, _)| rival.used() >= best.used())?;
+            let consensus = self.best_two(&allowed)?.best;
+            if consensus.used() < best.used() {
+                return None;
+            }
             let estimate = self.estimate(&consensus.fit, &consensus.weights)?;
             Some(Rival { estimate, consensus: Some(consensus) })
         });
@@ -290,7 +306,8 @@ impl Scene<'_> {
         if estimate.fits_badly() {
             estimate.covariance *= estimate.variance_factor();
         }
-        Some(estimate)
+        // What is hardly determined may not survive the scaling.
+        estimate.covariance.cholesky().map(|_| estimate)
     }
 
     fn used(&self, best: &Consensus) -> Vec<TagId> {

@@ -114,3 +114,34 @@ fn noise_is_not_enlarged_much() {
     // The rows' times multiply the pose's error by 1 + τ/Δt, τ here up to half of the read-out of 0.6 Δt: 1.3.
     assert!(moving < 1.3 * still, "{moving} {still}");
 }
+
+#[test]
+fn where_a_tag_was_does_not_decide_where_it_is() {
+    // Flat, small, slowly moving; and the pose before may have been the wrong one of two.
+    let body = Body::single(tag(0), 0.05);
+    let solver =
+        PoseSolver::new(&pinhole(), &body).unwrap().with_rolling_shutter(READOUT_S, HEIGHT_PX).unwrap();
+    let mut random = Random(34);
+    let (mut flips, mut ambiguous, mut silent) = (0, 0, 0);
+    for view in 0..4000 {
+        let moving = motion(0.0, &mut random);
+        let away = 0.05 * FOCAL_PX / random.between(20.0, 60.0) / moving.now.translation.vector.norm();
+        let mut now = moving.now;
+        now.translation.vector *= away;
+        let moving = Motion { now, ..moving };
+        let seen = observe_moving(&pinhole(), &body, |row| moving.at(row_time_s(row)), 0.1, &mut random);
+        let mut camera_from_body = moving.at(-FRAME_S);
+        if view % 2 == 0 {
+            camera_from_body.rotation = mirrored(&camera_from_body);
+        }
+        let before = Some(Before { camera_from_body, elapsed_s: FRAME_S });
+        let pose = solver.solve(&seen, &Past { expected: None, before }).unwrap();
+        let found = pose.estimate.camera_from_body.rotation;
+        let flipped = found.angle_to(&mirrored(&moving.now)) < found.angle_to(&moving.now.rotation);
+        flips += u32::from(flipped);
+        ambiguous += u32::from(pose.certainty.is_ambiguous());
+        silent += u32::from(flipped && !pose.certainty.is_ambiguous());
+    }
+    println!("of 4000: {flips} flips, {silent} of them silent, {ambiguous} ambiguous");
+    assert!(flips > 50 && silent <= 1, "{flips} {silent}");
+}
