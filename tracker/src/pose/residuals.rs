@@ -154,7 +154,7 @@ mod tests {
         )
         .unwrap();
         let body = Body::single(TagId { family: Family::Tag36h11, id: 3 }, 0.1);
-        let pose = crate::lie::exp(&Vector6::new(2.8, 0.3, -0.4, 0.3, -0.2, 0.1));
+        let pose = lie::exp(&Vector6::new(2.8, 0.3, -0.4, 0.3, -0.2, 0.1));
         let mut covariance = SMatrix::<f64, 8, 8>::identity() * 0.04;
         covariance[(0, 1)] = 0.03;
         covariance[(1, 0)] = 0.03;
@@ -165,7 +165,7 @@ mod tests {
         };
         let times_s = [-0.01, -0.004, 0.006, 0.012];
         let target = Target::new(&observation, body.tags[0].corners_m(), times_s).unwrap();
-        let before = crate::lie::exp(&Vector6::new(0.05, -0.1, 0.2, 0.04, 0.03, -0.02)) * pose;
+        let before = lie::exp(&Vector6::new(0.05, -0.1, 0.2, 0.04, 0.03, -0.02)) * pose;
         let since = RowMotion::Since { before, elapsed_s: 0.03 };
         let centre = pose.translation.vector;
         const STEP: f64 = 1e-6;
