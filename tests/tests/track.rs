@@ -198,7 +198,7 @@ fn axes_are_drawn_where_the_board_is() {
     let folder = tempfile::tempdir().unwrap();
     desk(folder.path());
     coshade(folder.path(), "track session.toml -o all").success();
-    coshade(folder.path(), "track session.toml --frame 5 -o one.png").success();
+    coshade(folder.path(), "track session.toml --frames 6 -o one.png").success();
     let one = image::open(folder.path().join("one.png")).unwrap().into_rgb8();
     assert!(one == image::open(folder.path().join("all/000005.png")).unwrap().into_rgb8());
     assert_eq!(std::fs::read_dir(folder.path().join("all")).unwrap().count() as u32, FRAMES);
@@ -220,6 +220,15 @@ fn axes_are_drawn_where_the_board_is() {
     for (dx, dy) in [(TAG_PX + 4.0, 0.0), (-8.0, 0.0), (0.0, -TAG_PX - 4.0)] {
         assert_eq!(drawn(x + dx, y + dy), Rgb([225; 3]), "nothing is drawn at {dx} {dy}");
     }
+}
+
+#[test]
+fn one_frame_is_tracked_by_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    desk(folder.path());
+    let found = coshade(folder.path(), "track session.toml --frame 5 --json").success().json();
+    assert_eq!(found["frames"].as_array().unwrap().len(), 1);
+    assert_is_truth(&found["frames"][0], 5);
 }
 
 #[test]

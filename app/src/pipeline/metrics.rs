@@ -1,6 +1,6 @@
 //! Counters, latency, CPU time.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -13,6 +13,8 @@ use super::supervise::thread_cpu;
 pub struct Metrics {
     /// Wall clock since the start.
     pub elapsed_s: f64,
+    /// How the camera is now.
+    pub camera: CameraState,
     /// Frames that the camera delivered, without damaged ones.
     pub frames_in: u64,
     /// Frames that were tracked.
@@ -47,6 +49,22 @@ pub struct Metrics {
     pub tracker_cpu_s: Option<f64>,
 }
 
+/// How a camera is. Unless it is delivering, the last frame is stale.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+#[repr(u8)]
+pub enum CameraState {
+    /// Frames come, or are about to.
+    #[default]
+    Delivering,
+    /// There, but nothing comes.
+    Stalled,
+    /// Gone; it is opened again if the pipeline is told to.
+    Lost,
+    /// Behind its last frame.
+    Ended,
+}
+
 /// Of many lengths of time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {
@@ -61,6 +79,7 @@ pub struct Spread {
 /// The live counterpart of [`Metrics`].
 #[derive(Default)]
 pub struct Counters {
+    camera: AtomicU8,
     /// See [`Metrics::frames_in`].
     pub frames_in: Counter,
     /// See [`Metrics::tracked`].
@@ -92,6 +111,18 @@ struct Times {
 }
 
 impl Counters {
+    /// See [`Metrics::camera`].
+    pub fn set_camera(&self, state: CameraState) {
+        self.camera.store(state as u8, Ordering::Relaxed);
+    }
+
+    /// See [`Metrics::camera`].
+    pub fn camera(&self) -> CameraState {
+        use CameraState::{Delivering, Ended, Lost, Stalled};
+        let state = self.camera.load(Ordering::Relaxed);
+        [Stalled, Lost, Ended].into_iter().find(|known| *known as u8 == state).unwrap_or(Delivering)
+    }
+
     /// Notes how long a frame took.
     pub fn note(&self, latency: Duration, capture_latency: Option<Duration>, track: Duration) {
         let mut times = self.times();
@@ -113,6 +144,7 @@ impl Counters {
         let (elapsed_s, tracked) = (elapsed.as_secs_f64(), self.tracked.get());
         Metrics {
             elapsed_s,
+            camera: self.camera(),
             frames_in: self.frames_in.get(),
             tracked,
             tracked_per_s: if elapsed_s > 0.0 { tracked as f64 / elapsed_s } else { 0.0 },

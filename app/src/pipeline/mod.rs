@@ -44,7 +44,7 @@ use coshade_capture::{LatestError, Timestamp, clock};
 
 pub use event::{Event, Severity};
 pub use handover::Handover;
-pub use metrics::Metrics;
+pub use metrics::{CameraState, Metrics};
 pub use source::{Retry, Source};
 pub use tracker::{Track, TrackedFrame};
 
@@ -163,6 +163,11 @@ impl<T: Send + 'static> Pipeline<T> {
     /// What has happened since the last call.
     pub fn events(&self) -> impl Iterator<Item = Event> + '_ {
         self.events.take()
+    }
+
+    /// How the camera is now.
+    pub fn camera(&self) -> CameraState {
+        self.shared.counters.camera()
     }
 
     /// What it has done so far.

@@ -8,6 +8,7 @@ use coshade_capture::{Camera, CaptureError, Frame, StreamInfo, Timestamp, clock}
 use super::backoff::Backoff;
 use super::event::{Reporter, Severity};
 use super::handover::Outlet;
+use super::metrics::CameraState;
 use super::supervise::guarded;
 use super::{Options, POLL, Shared};
 
@@ -66,6 +67,7 @@ pub fn run(source: Source, out: Outlet<Arrival>, options: Options, shared: &Shar
     };
     while !shared.stopped() {
         if !thread.step()? {
+            shared.counters.set_camera(CameraState::Ended);
             return thread.ended();
         }
         shared.counters.camera_cpu.update();
@@ -118,6 +120,7 @@ impl SourceThread<'_> {
     fn frame(&mut self, frame: Frame, is_live: bool) -> bool {
         let at = clock::now();
         if let Some(quiet) = self.quiet.end() {
+            self.shared.counters.set_camera(CameraState::Delivering);
             let message = format!("{}: frames again after {:.2} s", self.name, quiet.as_secs_f64());
             self.reporter.report(Severity::Info, message);
         }
@@ -159,6 +162,7 @@ impl SourceThread<'_> {
     fn timeout(&mut self, waited: Duration) {
         if let Some(quiet) = self.quiet.wait(waited) {
             self.shared.counters.stalls.count();
+            self.shared.counters.set_camera(CameraState::Stalled);
             let message = format!("{}: stalled, no frame for {:.2} s", self.name, quiet.as_secs_f64());
             self.reporter.report(Severity::Warning, message);
         }
@@ -167,6 +171,7 @@ impl SourceThread<'_> {
     fn lost(&mut self, reason: &str) -> anyhow::Result<()> {
         self.camera = None;
         self.shared.counters.lost.count();
+        self.shared.counters.set_camera(CameraState::Lost);
         if self.options.retry == Retry::Never {
             bail!("{reason}");
         }

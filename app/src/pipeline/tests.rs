@@ -226,6 +226,7 @@ fn a_file_that_breaks_off_is_not_read_twice() {
     let (numbers, finished) = run(camera, FirstPixel::default(), EVERY);
     assert_eq!(numbers, [0, 1], "what was there is tracked");
     assert_eq!(format!("{:#}", finished.failures[0]), "thread `camera`: scripted:: unplugged");
+    assert_eq!(finished.metrics.camera, CameraState::Lost);
 }
 
 #[test]
@@ -337,6 +338,19 @@ fn it_ends_after_the_frames_that_are_wanted() {
     let (numbers, finished) = run(endless, FirstPixel::default(), Options { max_frames: Some(3), ..EVERY });
     assert_eq!((numbers, finished.metrics.tracked), (vec![0, 1, 2], 3));
     assert!(finished.failures.is_empty(), "{:?}", finished.failures);
+}
+
+#[test]
+fn it_says_how_the_camera_is() {
+    let script = [Frame, Nothing(400), Nothing(200), Lost];
+    let mut pipeline = start(source(Scripted::new(script), []), FirstPixel::default(), LIVE);
+    let hang = clock::now() + HANG;
+    for state in [CameraState::Delivering, CameraState::Stalled, CameraState::Delivering, CameraState::Lost] {
+        while pipeline.camera() != state {
+            assert!(clock::now() < hang, "never {state:?}");
+            let _ = pipeline.receive(Duration::from_millis(1));
+        }
+    }
 }
 
 /// Everything that frames of one size need is there after the first few: their pixels are shared, the brightness of other

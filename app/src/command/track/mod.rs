@@ -20,7 +20,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::print;
 use crate::interrupt;
-use crate::pipeline::{Event, Finished, Handover, Options, Pipeline, Retry, Severity};
+use crate::pipeline::{CameraState, Event, Finished, Handover, Options, Pipeline, Retry, Severity};
 use bodies::Bodies;
 use input::{Beside, Input};
 use output::Output;
@@ -100,7 +100,7 @@ pub struct Args {
     /// Poses: `position_m`, `quaternion_xyzw`, and the same rotation as `rotation_deg`.
     /// `bodies` and `tags` of all frames: `frames` (in how many), `certainty` (how many of each), `jumps` (times that a
     /// measured rotation changed by more than 30 degrees between neighbouring frames), `frames_with_rejected_tags`, `rms_px`.
-    /// `pipeline`: `elapsed_s`, `frames_in`, `tracked`, `tracked_per_s`, `overwritten` (before tracking), `unread` (behind it),
+    /// `pipeline`: `elapsed_s`, `camera` (`delivering`, `stalled`, `lost`, `ended`), `frames_in`, `tracked`, `tracked_per_s`, `overwritten` (before tracking), `unread` (behind it),
     /// `missing` (by number), `damaged`, `stalls`, `lost`, `restarts`, `events_dropped`, `latency_ms`, `capture_latency_ms`
     /// (from the middle of the exposure; live cameras), `track_ms`, `camera_cpu_s`, `tracker_cpu_s`.
     /// `events`: `at_s`, `thread`, `severity`, `message`.
@@ -141,6 +141,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let mut events = Vec::new();
     while !stop.load(Ordering::Relaxed) {
         note(pipeline.events(), &mut events);
+        progress.set_message(status(pipeline.camera()));
         let tracked = match pipeline.receive(POLL) {
             Ok(tracked) => tracked,
             Err(LatestError::Timeout) => continue,
@@ -219,10 +220,18 @@ fn progress(args: &Args) -> ProgressBar {
         return ProgressBar::hidden();
     }
     let progress = ProgressBar::new_spinner();
-    if let Ok(style) = ProgressStyle::with_template("tracking {elapsed} {pos} frames, {per_sec}") {
+    if let Ok(style) = ProgressStyle::with_template("tracking {elapsed} {pos} frames, {per_sec} {msg}") {
         progress.set_style(style);
     }
     progress
+}
+
+fn status(camera: CameraState) -> &'static str {
+    match camera {
+        CameraState::Delivering | CameraState::Ended => "",
+        CameraState::Stalled => "(the camera has stalled)",
+        CameraState::Lost => "(the camera is gone)",
+    }
 }
 
 fn tag(text: &str) -> Result<(TagId, f64), String> {
