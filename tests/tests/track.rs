@@ -263,6 +263,34 @@ fn a_damaged_frame_is_left_out_and_told() {
 }
 
 #[test]
+fn a_tag_that_is_not_as_described_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    desk(folder.path());
+    let board = std::fs::read_to_string(folder.path().join("board.toml")).unwrap();
+    let size = |scale: f64| format!("size_m = {}", scale * TAG_M);
+    // One of four: the others outvote it.
+    write(folder.path(), "board.toml", &board.replacen(&size(1.0), &size(2.0), 1));
+    let found = coshade(folder.path(), "track session.toml --json").success().json();
+    for row in found["frames"].as_array().unwrap() {
+        let rejected = &row["bodies"][0]["tags_rejected"];
+        assert_eq!(
+            (&rejected[0]["tag"], rejected.as_array().unwrap().len()),
+            (&"tag36h11 0".into(), 1),
+            "{row}"
+        );
+        assert!(rejected[0]["reason"].as_str().unwrap().contains("px from where"), "{rejected}");
+    }
+    assert_eq!(found["bodies"][0]["frames_with_rejected_tags"], FRAMES);
+    // All of them, not so far apart as they are large: nobody can tell which is right, only that nothing fits.
+    write(folder.path(), "board.toml", &board.replace(&size(1.0), &size(2.0)));
+    let run = coshade(folder.path(), "track session.toml --json --frames 2").success();
+    let warning = run.json()["warnings"][0]["message"].as_str().unwrap().to_owned();
+    assert!(warning.contains("board.toml: tags do not fit the body"), "{warning}");
+    assert!(run.stderr.contains(&warning), "{}", run.stderr);
+    assert!(coshade(folder.path(), "track session.toml --frames 2").success().stdout.contains(&warning));
+}
+
+#[test]
 fn pictures_without_tags_are_no_error() {
     let folder = tempfile::tempdir().unwrap();
     desk(folder.path());

@@ -103,6 +103,7 @@ pub struct Args {
     /// `pipeline`: `elapsed_s`, `camera` (`delivering`, `stalled`, `lost`, `ended`), `frames_in`, `tracked`, `tracked_per_s`, `overwritten` (before tracking), `unread` (behind it),
     /// `missing` (by number), `damaged`, `stalls`, `lost`, `restarts`, `events_dropped`, `latency_ms`, `capture_latency_ms`
     /// (from the middle of the exposure; live cameras), `track_ms`, `camera_cpu_s`, `tracker_cpu_s`.
+    /// `warnings`: what the tracker had to say, alike ones together: `message` (the first), `first_frame`, `count`.
     /// `events`: `at_s`, `thread`, `severity`, `message`.
     #[arg(long, verbatim_doc_comment, conflicts_with = "json_lines")]
     json: bool,
@@ -156,9 +157,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     progress.finish_and_clear();
     note(finished.events.iter().cloned(), &mut events);
     let frames = output.finish()?;
-    let (body_summaries, tags) = tally.finish();
-    let pipeline = finished.metrics.clone();
-    report(args, &Summary { input: name, pipeline, bodies: body_summaries, tags, events, frames }, finished)
+    let summary = tally.finish(name, finished.metrics.clone(), events, frames);
+    report(args, &summary, finished)
 }
 
 fn report(args: &Args, summary: &Summary, finished: Finished) -> anyhow::Result<ExitCode> {

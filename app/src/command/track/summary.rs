@@ -14,6 +14,9 @@ use crate::pipeline::{Event, Metrics};
 /// A rotation by more from one frame to the next is no motion of a hand: at 30 frames a second, 900° a second.
 const JUMP_DEG: f64 = 30.0;
 
+/// Kinds of warnings that are told apart; there are far fewer.
+const MAX_KINDS: usize = 100;
+
 /// The figures of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
@@ -25,7 +28,9 @@ pub struct Summary {
     pub bodies: Vec<BodySummary>,
     /// Every tag seen.
     pub tags: Vec<TagSummary>,
-    /// Errors, warnings and recoveries.
+    /// What the tracker had to say, alike ones together.
+    pub warnings: Vec<WarningSummary>,
+    /// Errors, warnings and recoveries of the threads.
     pub events: Vec<EventRow>,
     /// One for each frame; left out with --json-lines.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -60,6 +65,17 @@ pub struct TagSummary {
     pub frames: u64,
 }
 
+/// Warnings that differ in numbers only.
+#[derive(Clone, Debug, Serialize)]
+pub struct WarningSummary {
+    /// The first of them.
+    pub message: String,
+    /// The frame it was about.
+    pub first_frame: u64,
+    /// How many there were.
+    pub count: u64,
+}
+
 /// Something that happened.
 #[derive(Clone, Debug, Serialize)]
 pub struct EventRow {
@@ -88,6 +104,7 @@ impl From<&Event> for EventRow {
 pub struct Tally {
     bodies: Vec<BodyTally>,
     tags: BTreeMap<(&'static str, u32), u64>,
+    warnings: BTreeMap<String, WarningSummary>,
 }
 
 struct BodyTally {
@@ -105,11 +122,12 @@ impl Tally {
             rms_px: Vec::new(),
             last: None,
         };
-        Self { bodies: bodies.iter().map(of).collect(), tags: BTreeMap::new() }
+        Self { bodies: bodies.iter().map(of).collect(), tags: BTreeMap::new(), warnings: BTreeMap::new() }
     }
 
-    /// Adds a frame.
+    /// Adds a frame. Warnings of a new kind go to the log.
     pub fn add(&mut self, frame: &FrameRow) {
+        frame.warnings.iter().for_each(|warning| self.warn(frame.frame, warning));
         for tag in &frame.tags {
             *self.tags.entry((tag.family, tag.id)).or_default() += 1;
         }
@@ -118,10 +136,35 @@ impl Tally {
         }
     }
 
-    /// The figures.
-    pub fn finish(self) -> (Vec<BodySummary>, Vec<TagSummary>) {
-        let tags = self.tags.into_iter().map(|((family, id), frames)| TagSummary { family, id, frames });
-        (self.bodies.into_iter().map(BodyTally::finish).collect(), tags.collect())
+    fn warn(&mut self, frame: u64, message: &str) {
+        let kind: String = message.chars().filter(|letter| !letter.is_ascii_digit()).collect();
+        if let Some(known) = self.warnings.get_mut(&kind) {
+            known.count += 1;
+        } else if self.warnings.len() < MAX_KINDS {
+            tracing::warn!("frame {frame}: {message}");
+            let first = WarningSummary { message: message.to_owned(), first_frame: frame, count: 1 };
+            self.warnings.insert(kind, first);
+        }
+    }
+
+    /// The figures, beside what the pipeline says.
+    pub fn finish(
+        self,
+        input: String,
+        pipeline: Metrics,
+        events: Vec<EventRow>,
+        frames: Option<Vec<FrameRow>>,
+    ) -> Summary {
+        let tag = |((family, id), frames)| TagSummary { family, id, frames };
+        Summary {
+            input,
+            pipeline,
+            bodies: self.bodies.into_iter().map(BodyTally::finish).collect(),
+            tags: self.tags.into_iter().map(tag).collect(),
+            warnings: self.warnings.into_values().collect(),
+            events,
+            frames,
+        }
     }
 }
 
@@ -191,6 +234,9 @@ impl Summary {
         }
         for body in &self.bodies {
             let _ = writeln!(out, "  {}", body.text());
+        }
+        for WarningSummary { message, first_frame, count } in &self.warnings {
+            let _ = writeln!(out, "  warning, {count} times, first of frame {first_frame}: {message}");
         }
         let tags: Vec<_> =
             self.tags.iter().map(|tag| format!("{} {} ({})", tag.family, tag.id, tag.frames)).collect();
