@@ -1,9 +1,11 @@
 //! Tags in an image: the AprilTag 3 library (Wang and Olson, *AprilTag 2: Efficient and robust fiducial detection*, IROS
 //! 2016), behind an interface that other ways to find tags can share.
 
+mod limits;
 mod noise;
 mod settings;
 
+use std::cmp::Ordering;
 use std::ptr::NonNull;
 
 use apriltag_sys as c;
@@ -13,14 +15,16 @@ use nalgebra::Vector2;
 use crate::detection::{Detection, TagId};
 use crate::family::Table;
 use crate::luma::Luma;
+use limits::Search;
 pub use settings::{DetectorError, DetectorSettings};
 
 /// What finds tags in images.
 pub trait FindTags: Send {
-    /// All tags in view, one that is there twice twice.
+    /// All tags in view by family and number; one that is there twice, twice.
     ///
     /// # Errors
-    /// [`DetectorError::Image`] for one that is too large.
+    /// [`DetectorError::Image`] for one that is too large, [`DetectorError::Threads`] and [`DetectorError::Memory`] where the
+    /// system has none.
     fn find(&mut self, image: &Luma) -> Result<Vec<Detection>, DetectorError>;
 
     /// Tags within a part of the image, in coordinates of the whole image. Where the part reaches beyond the image, it is
@@ -73,11 +77,6 @@ unsafe impl Send for Library {}
 // SAFETY: as above; tables are read only.
 unsafe impl Send for Family {}
 
-/// Images with a shorter side than this hold no tag that could be read, and no tile of the library's threshold.
-const MIN_SIDE_PX: u32 = 8;
-/// The library counts half pixels in 16 bits.
-const MAX_SIDE_PX: u32 = 16_384;
-
 impl Detector {
     /// A detector.
     ///
@@ -123,26 +122,49 @@ impl Detector {
         let settings = &self.settings;
         // SAFETY: alive, and nobody else knows it.
         let library = unsafe { self.library.0.as_mut() };
-        library.nthreads = settings.threads as i32;
         library.quad_decimate = settings.decimate;
-        library.quad_sigma = settings.blur_px;
         library.refine_edges = settings.refine_edges;
         library.decode_sharpening = settings.decode_sharpening;
         library.qtp.min_cluster_pixels = settings.min_cluster_pixels as i32;
     }
 
-    /// What is searched for tags: what has more contrast than noise alone. The library looks at the range of 144 pixels,
-    /// which for normal noise is 5.3 ± 0.7 standard deviations.
-    fn set_contrast(&mut self, image: &Luma) {
+    /// Gets ready for an image; false if it is too small for tags.
+    fn prepare(&mut self, image: &Luma) -> Result<bool, DetectorError> {
+        let Some(search) = Search::new(&self.settings, image)? else { return Ok(false) };
+        // What has more contrast than noise alone is searched. The library looks at the range of 144 pixels, which for normal
+        // noise is 5.3 ± 0.7 standard deviations.
         let above_noise = || (6.3 * noise::noise(image)).clamp(5.0, 40.0) as u32;
         let diff = self.settings.min_white_black_diff.unwrap_or_else(above_noise);
         // SAFETY: alive, and nobody else knows it.
-        unsafe { self.library.0.as_mut() }.qtp.min_white_black_diff = diff as i32;
+        let library = unsafe { self.library.0.as_mut() };
+        library.nthreads = search.threads as i32;
+        library.quad_sigma = search.blur_px;
+        library.qtp.min_white_black_diff = diff as i32;
+        Ok(true)
+    }
+
+    /// Whether the library started the threads it was asked for. If it did not, it returned no tags.
+    fn check_threads(&mut self) -> Result<(), DetectorError> {
+        // SAFETY: alive, and nobody else knows it.
+        let library = unsafe { self.library.0.as_mut() };
+        match library.wp.is_null() {
+            true => Err(DetectorError::Threads { threads: library.nthreads.unsigned_abs() }),
+            false => Ok(()),
+        }
     }
 
     /// Whether the library writes to the image that it is given.
     fn writes(&self) -> bool {
         self.settings.blur_px != 0.0 && self.settings.decimate <= 1.0
+    }
+
+    /// How far the library's corners are off to the lower right. A whole `decimate` takes the first pixel of each square for
+    /// the square, whose middle is elsewhere; refined edges have been moved to where they are.
+    fn offset_px(&self) -> f64 {
+        match self.settings.refine_edges || self.settings.decimate == 1.5 {
+            true => 0.0,
+            false => (f64::from(self.settings.decimate) - 1.0) / 2.0,
+        }
     }
 
     fn family_of(&self, pointer: *const c::apriltag_family_t) -> Option<crate::Family> {
@@ -153,7 +175,8 @@ impl Detector {
     fn detection(&self, found: &c::apriltag_detection_t) -> Option<Detection> {
         let tag = TagId { family: self.family_of(found.family)?, id: u32::try_from(found.id).ok()? };
         // In the library's order: lower left, lower right, upper right, upper left.
-        let corners_px = found.p.map(|[x, y]| CameraPx::from_apriltag(x, y).0);
+        let offset = self.offset_px();
+        let corners_px = found.p.map(|[x, y]| CameraPx::from_apriltag(x - offset, y - offset).0);
         let finite = corners_px.iter().flatten().all(|coordinate| coordinate.is_finite());
         let hamming = u32::try_from(found.hamming).ok()?;
         finite.then_some(Detection { tag, corners_px, hamming, margin: found.decision_margin })
@@ -162,14 +185,10 @@ impl Detector {
 
 impl FindTags for Detector {
     fn find(&mut self, image: &Luma) -> Result<Vec<Detection>, DetectorError> {
-        let (width_px, height_px) = (image.width_px(), image.height_px());
-        if width_px.max(height_px) > MAX_SIDE_PX {
-            return Err(DetectorError::Image { width_px, height_px });
-        }
-        if (width_px.min(height_px) as f32) < MIN_SIDE_PX as f32 * self.settings.decimate {
+        if !self.prepare(image)? {
             return Ok(Vec::new());
         }
-        self.set_contrast(image);
+        let (width_px, height_px) = (image.width_px(), image.height_px());
         // A part of an image is copied as well: the library's own images have rows as long as the given one's.
         let copied = self.writes() || image.stride_bytes() > 2 * width_px;
         let (bytes, stride) = if copied {
@@ -190,7 +209,7 @@ impl FindTags for Detector {
         let list = unsafe { c::apriltag_detector_detect(self.library.0.as_ptr(), &raw mut given) };
         let Some(list) = NonNull::new(list) else { return Err(DetectorError::Memory) };
         // SAFETY: the list is alive and holds `size` pointers to detections, one after the other.
-        let found = unsafe {
+        let mut found: Vec<Detection> = unsafe {
             let zarray = list.as_ref();
             let count = usize::try_from(zarray.size).unwrap_or(0);
             let pointers = zarray.data.cast::<*const c::apriltag_detection_t>();
@@ -199,8 +218,16 @@ impl FindTags for Detector {
         };
         // SAFETY: made by the library for us, and not used any more.
         unsafe { c::apriltag_detections_destroy(list.as_ptr()) };
+        self.check_threads()?;
+        // Several threads find them in any order.
+        found.sort_by(|a, b| a.tag.cmp(&b.tag).then_with(|| by_place(a, b)));
         Ok(found)
     }
+}
+
+fn by_place(a: &Detection, b: &Detection) -> Ordering {
+    let [[a, ..], [b, ..]] = [a.corners_px, b.corners_px];
+    a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y))
 }
 
 impl std::fmt::Debug for Detector {

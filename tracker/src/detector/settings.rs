@@ -7,15 +7,17 @@ use crate::family::Family;
 pub struct DetectorSettings {
     /// Families that are looked for, each once. More: slower, and more that can be mistaken.
     pub families: Vec<Family>,
-    /// Outlines are looked for in an image this many times smaller, 1 to 16; bits are read from the whole one. Higher: faster.
-    /// Lower: smaller tags are found; about 20 px times this.
+    /// Outlines are looked for in an image this many times smaller: 1, 1.5 or a whole number up to 16; bits are read from the
+    /// whole one. Higher: faster. Lower: smaller tags are found; about 20 px times this.
     pub decimate: f32,
-    /// Threads, 1 to 64. One uses the caller's.
+    /// Threads, 1 to 64. One is the caller's own; more are started with the first image and wait for the next. Higher: images
+    /// of megapixels are done sooner, at more work altogether.
     pub threads: u32,
     /// Standard deviation of a blur before outlines are looked for, in px of the smaller image, −8 to 8; negative numbers
-    /// sharpen. Higher: less disturbed by noise. 0: as it is.
+    /// sharpen. Higher: less disturbed by noise, small tags are lost. Lower: the other way round. Between −0.5 and 0.5: as it is.
     pub blur_px: f32,
-    /// Move the edges of outlines to the steepest place near them: matters with `decimate`.
+    /// Move the edges of outlines to the steepest place near them, in the whole image. True: more exact, above all with
+    /// `decimate`. False: faster.
     pub refine_edges: bool,
     /// Sharpening when bits are read, 0 to 4. Higher: smaller tags can be read. Lower: less disturbed by noise.
     pub decode_sharpening: f64,
@@ -77,15 +79,24 @@ pub enum DetectorError {
     /// The library could not allocate.
     #[error("the AprilTag library has no memory")]
     Memory,
+    /// The threads could not be started.
+    #[error("the system did not start {threads} threads for the AprilTag library: set fewer threads")]
+    Threads {
+        /// How many there should have been.
+        threads: u32,
+    },
     /// The image is too large.
     #[error(
-        "an image of {width_px} x {height_px} pixels: tags are looked for in images of at most 16384 x 16384 pixels"
+        "an image of {width_px} x {height_px} pixels, searched at decimate = {decimate}: no side may be longer than 16384 \
+         pixels, and no more than 8192 x 8192 pixels are searched: set decimate higher, or scale the image down"
     )]
     Image {
         /// Width in pixels.
         width_px: u32,
         /// Height in pixels.
         height_px: u32,
+        /// How many times smaller it would have been searched.
+        decimate: f32,
     },
 }
 
@@ -98,7 +109,13 @@ impl DetectorSettings {
             true => Ok(()),
             false => Err(DetectorError::Range { name, value, range }),
         };
-        range("decimate", f64::from(self.decimate), 1.0, 16.0, "1 to 16")?;
+        // Other numbers: the library shrinks by the whole number below, and stretches what it finds by the number itself.
+        let allowed =
+            |decimate: f32| decimate == 1.5 || decimate.fract() == 0.0 && (1.0..=16.0).contains(&decimate);
+        if !allowed(self.decimate) {
+            let (value, range) = (f64::from(self.decimate), "1, 1.5 or a whole number up to 16");
+            return Err(DetectorError::Range { name: "decimate", value, range });
+        }
         range("threads", f64::from(self.threads), 1.0, 64.0, "1 to 64")?;
         range("blur_px", f64::from(self.blur_px), -8.0, 8.0, "-8 to 8")?;
         range("decode_sharpening", self.decode_sharpening, 0.0, 4.0, "0 to 4")?;
