@@ -27,7 +27,7 @@ use crate::bitmap::TagError;
 use crate::detection::{TagId, TagObservation};
 use crate::luma::Luma;
 use chart::{Chart, is_front};
-use fit::{Fit, Fitted};
+use fit::{Fit, Fitted, Scratch, TOLERATED};
 use light::LightOfCode;
 use template::Template;
 
@@ -104,23 +104,15 @@ pub enum RefineError {
 }
 
 /// How far a fit is taken.
+#[derive(Clone, Copy, Debug)]
 struct Stage {
     max_pixels: usize,
     max_iterations: u32,
     /// Corners that move by less in a step are done, in px. Gauss–Newton's next step would be a tenth of it or less.
     converged_px: f64,
-}
-
-impl Stage {
-    fn coarse(settings: &RefineSettings) -> Self {
-        let RefineSettings { max_pixels, max_iterations, .. } = *settings;
-        Self { max_pixels: (max_pixels / 4).max(MIN_COARSE), max_iterations, converged_px: 0.1 }
-    }
-
-    fn fine(settings: &RefineSettings) -> Self {
-        let RefineSettings { max_pixels, max_iterations, .. } = *settings;
-        Self { max_pixels, max_iterations, converged_px: 0.02 }
-    }
+    /// Deviations that are tolerated in the first step, as a fraction of the contrast. Corners that are a cell off deviate
+    /// by much.
+    tolerated: f64,
 }
 
 /// A pixel to be explained.
@@ -159,13 +151,21 @@ pub struct Refiner {
     settings: RefineSettings,
     templates: HashMap<TagId, Template>,
     samples: Vec<Sample>,
+    scratch: Scratch,
 }
 
 impl Refiner {
     /// For a camera with a `lens` (without: edges are taken to be straight in the image) and a `response`.
     pub fn new(lens: Option<CameraModel>, response: &Response, settings: RefineSettings) -> Self {
         let light = LightOfCode::new(response);
-        Self { lens, light, settings, templates: HashMap::new(), samples: Vec::new() }
+        Self {
+            lens,
+            light,
+            settings,
+            templates: HashMap::new(),
+            samples: Vec::new(),
+            scratch: Scratch::default(),
+        }
     }
 
     /// Refines corners that are right to about a cell of the tag.
@@ -178,10 +178,20 @@ impl Refiner {
         tag: TagId,
         corners_px: &[Vector2<f64>; 4],
     ) -> Result<Refined, RefineError> {
-        self.refine_with(image, tag, corners_px, self.settings)
+        let RefineSettings { max_pixels, max_iterations, .. } = self.settings;
+        // Which pixels speak, and how loudly, depends on blur and noise, which a first, coarse fit finds.
+        let coarse = Stage {
+            max_pixels: (max_pixels / 4).max(MIN_COARSE),
+            max_iterations,
+            converged_px: 0.1,
+            tolerated: 0.24,
+        };
+        let fine = Stage { max_pixels, converged_px: 0.02, tolerated: TOLERATED, ..coarse };
+        self.run(image, tag, corners_px, &[coarse, fine])
     }
 
-    /// As [`refine`](Self::refine), looking at another number of pixels: to follow a tag fast.
+    /// As [`refine`](Self::refine), for corners that are right to a pixel or two, looking at another number of pixels: to
+    /// follow a tag fast.
     ///
     /// # Errors
     /// As [`refine`](Self::refine).
@@ -192,15 +202,17 @@ impl Refiner {
         corners_px: &[Vector2<f64>; 4],
         max_pixels: usize,
     ) -> Result<Refined, RefineError> {
-        self.refine_with(image, tag, corners_px, RefineSettings { max_pixels, ..self.settings })
+        let max_iterations = self.settings.max_iterations;
+        let near = Stage { max_pixels, max_iterations, converged_px: 0.04, tolerated: 0.12 };
+        self.run(image, tag, corners_px, &[near])
     }
 
-    fn refine_with(
+    fn run(
         &mut self,
         image: &Luma,
         tag: TagId,
         corners_px: &[Vector2<f64>; 4],
-        settings: RefineSettings,
+        stages: &[Stage],
     ) -> Result<Refined, RefineError> {
         if corners_px.iter().flatten().any(|coordinate| !coordinate.is_finite()) || !is_front(corners_px) {
             return Err(RefineError::Corners(tag));
@@ -212,19 +224,21 @@ impl Refiner {
         let chart = Chart::around(self.lens.as_ref(), corners_px).ok_or(RefineError::Corners(tag))?;
         let mut fit =
             Fit::start(template, &chart, corners_px, START_BLUR_PX).ok_or(RefineError::Corners(tag))?;
-        // Which pixels speak, and how loudly, depends on blur and noise, which a first, coarse fit finds.
-        for stage in [Stage::coarse(&settings), Stage::fine(&settings)] {
+        let mut sums = None;
+        for stage in stages {
             collect(&mut self.samples, image, &self.light, &chart, &fit, stage.max_pixels)
                 .ok_or(RefineError::Corners(tag))?;
             let pixels = self.samples.len();
             if pixels < MIN_PIXELS {
                 return Err(RefineError::Small { tag, pixels });
             }
-            fit.run(&self.samples, &stage)?;
+            sums = Some(fit.run(&self.samples, stage, &mut self.scratch)?);
         }
         let pixels = self.samples.len();
+        let sums = sums.ok_or(RefineError::Flat)?;
         let Fitted { corners_px, covariance_px2, blur_px, contrast, residual, explained, iterations } =
-            fit.finish(&self.samples)?;
+            fit.finish(&sums, &self.samples, &self.scratch)?;
+        let settings = &self.settings;
         if explained.is_nan() || explained < settings.min_explained {
             return Err(RefineError::Unlike { tag, explained });
         }
@@ -249,13 +263,14 @@ fn collect(
     let [low, high] = bounds(chart, template, fit, image)?;
     let area = (high - low + Vector2::repeat(1.0)).product();
     let share = max_pixels as f64 / (EDGE_SHARE * area);
+    let below = (share.min(1.0) * f64::from(u32::MAX)) as u32;
     let derivative = Derivative::new(chart, low, high)?;
     let (mut flat, [left, top, right, bottom]) =
         (0, [low.x as u32, low.y as u32, high.x as u32, high.y as u32]);
     for y in top..=bottom {
         let row = image.row(y);
         for x in left..=right {
-            if share < 1.0 && scattered(x, y) > share {
+            if scattered(x, y) > below {
                 continue;
             }
             let (Some(code), px) = (row.get(x as usize), Vector2::new(f64::from(x), f64::from(y))) else {
@@ -289,9 +304,9 @@ fn collect(
     Some(())
 }
 
-/// A number in 0 to 1 for each pixel: those below any bound lie evenly spread (Roberts' R₂ sequence, as a lattice).
-fn scattered(x: u32, y: u32) -> f64 {
-    (f64::from(x) * 0.754_877_666 + f64::from(y) * 0.569_840_291).fract()
+/// A number for each pixel: those below any bound lie evenly spread. Roberts' R₂ sequence as a lattice, in fractions of 2³².
+fn scattered(x: u32, y: u32) -> u32 {
+    x.wrapping_mul(0xc13f_a9a9).wrapping_add(y.wrapping_mul(0x91e1_0da5))
 }
 
 /// The rectangle of pixels around the tag and its outer ring, within the image.

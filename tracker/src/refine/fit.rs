@@ -1,6 +1,6 @@
 //! The least-squares fit of a blurred tag to the pixels of an image.
 
-use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2};
+use nalgebra::{DMatrixView, Matrix2, Matrix3, SMatrix, SVector, Vector2};
 
 use super::chart::{Chart, homography, is_front};
 use super::template::Template;
@@ -21,12 +21,13 @@ const USUAL_CURVATURE: f64 = 0.2;
 /// Tukey's biweight: 95 % efficient for normal errors.
 const TUKEY: f64 = 4.685;
 /// Deviations below this fraction of the contrast are never taken for something in front of the tag.
-const TOLERATED: f64 = 0.03;
-/// The same for the first step, whose corners may be a cell off.
-const TOLERATED_AT_FIRST: f64 = 0.24;
+pub(super) const TOLERATED: f64 = 0.03;
 
 type Normal = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 type Unknowns = SVector<f64, UNKNOWNS>;
+/// Unknowns and deviation.
+const COLUMNS: usize = UNKNOWNS + 1;
+type Square = SMatrix<f64, COLUMNS, COLUMNS>;
 
 /// The state of a fit.
 #[derive(Clone, Debug)]
@@ -45,11 +46,27 @@ pub(super) struct Fit<'a> {
 }
 
 /// Sums over the pixels.
-struct Sums {
+pub(super) struct Sums {
     normal: Normal,
     gradient: Unknowns,
     weight: f64,
     weighted_square: f64,
+}
+
+impl Sums {
+    /// Of the pixels' light, above 0.
+    fn variance(&self) -> f64 {
+        (self.weighted_square / (self.weight - UNKNOWNS as f64).max(1.0)).max(1e-3)
+    }
+}
+
+/// Memory that fits use again and again.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Scratch {
+    /// Of each pixel that counts: the derivative of its light by the unknowns, and its deviation, times the root of its
+    /// weight.
+    rows: Vec<f64>,
+    /// Of all pixels.
     deviations: Vec<f64>,
 }
 
@@ -131,24 +148,24 @@ impl<'a> Fit<'a> {
     }
 
     /// Fits to the samples.
-    pub(super) fn run(&mut self, samples: &[Sample], stage: &Stage) -> Result<(), RefineError> {
-        let mut tolerated = TOLERATED;
+    pub(super) fn run(
+        &mut self,
+        samples: &[Sample],
+        stage: &Stage,
+        scratch: &mut Scratch,
+    ) -> Result<Sums, RefineError> {
+        let mut tolerated = stage.tolerated;
         if self.noise.is_none() {
             self.start_light(samples).ok_or(RefineError::Flat)?;
-            tolerated = TOLERATED_AT_FIRST;
+            self.scale = tolerated * self.light[3];
         }
         let start = self.corners_px().ok_or(RefineError::Lost)?;
         let mut corners = start;
-        let mut sums = self.sums(samples);
-        for _ in 0..stage.max_iterations {
+        let mut sums;
+        loop {
             self.iterations += 1;
-            let contrast = self.light[3].abs();
-            self.scale = (1.4826 * median(&mut sums.deviations)).max(tolerated * contrast).max(0.5);
-            let last = tolerated <= TOLERATED;
-            tolerated = (0.5 * tolerated).max(TOLERATED);
-            sums = self.sums(samples);
-            let variance = (sums.weighted_square / sums.weight.max(1.0)).max(1e-3);
-            self.add_prior(&mut sums, variance);
+            sums = self.sums(samples, scratch);
+            self.add_prior(&mut sums);
             let step = sums.normal.cholesky().ok_or(RefineError::Flat)?.solve(&sums.gradient);
             self.apply(&(step * limit(&step)));
             let moved = self.corners_px().ok_or(RefineError::Lost)?;
@@ -157,30 +174,36 @@ impl<'a> Fit<'a> {
             if !shift.is_finite() || distance(&corners, &start) > self.reach_px(&start) {
                 return Err(RefineError::Lost);
             }
-            if shift < stage.converged_px && last {
+            let settled = tolerated <= TOLERATED && shift < stage.converged_px;
+            if settled || self.iterations >= stage.max_iterations {
                 break;
             }
+            tolerated = (0.5 * tolerated).max(TOLERATED);
+            self.scale =
+                (1.4826 * median(&mut scratch.deviations)).max(tolerated * self.light[3].abs()).max(0.5);
         }
         if self.light[3] <= 0.0 || !is_front(&corners) {
             return Err(RefineError::Lost);
         }
-        let freedom = (sums.weight - UNKNOWNS as f64).max(1.0);
-        self.noise = Some((sums.weighted_square / freedom).sqrt().max(0.3));
-        Ok(())
+        self.noise = Some(sums.variance().sqrt().max(0.3));
+        Ok(sums)
     }
 
-    /// Corners and their covariance.
-    pub(super) fn finish(&self, samples: &[Sample]) -> Result<Fitted, RefineError> {
-        let mut sums = self.sums(samples);
-        let variance = sums.weighted_square / (sums.weight - UNKNOWNS as f64).max(1.0);
-        self.add_prior(&mut sums, variance.max(1e-3));
+    /// Corners and their covariance, from the sums of the last step.
+    pub(super) fn finish(
+        &self,
+        sums: &Sums,
+        samples: &[Sample],
+        scratch: &Scratch,
+    ) -> Result<Fitted, RefineError> {
+        let variance = sums.variance();
         let inverse = sums.normal.cholesky().ok_or(RefineError::Flat)?.inverse();
         let of_homography = inverse.fixed_view::<8, 8>(0, 0) * variance;
         let by_unknowns = self.corners_by_homography().ok_or(RefineError::Lost)?;
         let covariance_px2 = by_unknowns * of_homography * by_unknowns.transpose();
         let mean = samples.iter().map(|sample| sample.light).sum::<f64>() / samples.len() as f64;
         let total = samples.iter().map(|sample| (sample.light - mean).powi(2)).sum::<f64>();
-        let left = sums.deviations.iter().map(|deviation| deviation * deviation).sum::<f64>();
+        let left = scratch.deviations.iter().map(|deviation| deviation * deviation).sum::<f64>();
         Ok(Fitted {
             corners_px: self.corners_px().ok_or(RefineError::Lost)?,
             covariance_px2,
@@ -219,70 +242,63 @@ impl<'a> Fit<'a> {
         by_px * by_px.transpose() * (2.0 * self.log_blur).exp()
     }
 
-    fn sums(&self, samples: &[Sample]) -> Sums {
-        let mut sums = Sums {
-            normal: Normal::zeros(),
-            gradient: Unknowns::zeros(),
-            weight: 0.0,
-            weighted_square: 0.0,
-            deviations: Vec::with_capacity(samples.len()),
-        };
-        let mut normal = [[0.0; UNKNOWNS]; UNKNOWNS];
+    fn sums(&self, samples: &[Sample], scratch: &mut Scratch) -> Sums {
+        scratch.rows.clear();
+        scratch.deviations.clear();
+        let mut weight_sum = 0.0;
         let middle = 0.5 * self.template.side();
         for sample in samples {
             let Some((cell, by_place)) = self.cell(&sample.place) else { continue };
             let shade = self.template.shade(cell, &self.covariance(&(by_place * sample.by_px)));
-            let (u, v) = ((cell.x - middle) / middle, (cell.y - middle) / middle);
-            let t = shade.value;
-            let light: SVector<f64, 7> = [1.0, u, v, t, u * t, v * t, t * (1.0 - t)].into();
-            let predicted = self.light.dot(&light);
+            let (u, v, t) = ((cell.x - middle) / middle, (cell.y - middle) / middle, shade.value);
+            let light = [1.0, u, v, t, u * t, v * t, t * (1.0 - t)];
+            let predicted: f64 = self.light.iter().zip(light).map(|(unknown, factor)| unknown * factor).sum();
             // Both beyond white: the code says no more than that.
             if sample.clipped && predicted > sample.light {
                 continue;
             }
             let deviation = sample.light - predicted;
-            sums.deviations.push(deviation);
+            scratch.deviations.push(deviation);
             let weight = sample.weight * tukey(deviation / (TUKEY * self.scale));
             if weight <= 0.0 {
                 continue;
             }
+            weight_sum += weight;
+            let root = weight.sqrt();
             let by_t =
                 self.light[3] + self.light[4] * u + self.light[5] * v + self.light[6] * (1.0 - 2.0 * t);
-            let gradient = shade.gradient * by_t;
-            let h = &self.cells_from_chart;
-            let (x, y) = (sample.place.x, sample.place.y);
-            let w = 1.0 / (h.m31 * x + h.m32 * y + h.m33);
-            let along = gradient.dot(&cell);
-            let (gx, gy, gw) = (gradient.x * w, gradient.y * w, -along * w);
-            let row = [
-                gx * x,
-                gx * y,
-                gx,
-                gy * x,
-                gy * y,
-                gy,
-                gw * x,
-                gw * y,
-                by_t * shade.by_log_blur,
-                light[0],
-                light[1],
-                light[2],
-                light[3],
-                light[4],
-                light[5],
-                light[6],
-            ];
-            accumulate(&mut normal, &row, weight);
-            sums.gradient += Unknowns::from(row) * (weight * deviation);
-            sums.weight += weight;
-            sums.weighted_square += weight * deviation * deviation;
+            let by_homography = self.by_homography(&sample.place, &cell, &(shade.gradient * (by_t * root)));
+            scratch.rows.extend_from_slice(&by_homography);
+            scratch.rows.push(root * by_t * shade.by_log_blur);
+            scratch.rows.extend(light.map(|factor| root * factor));
+            scratch.rows.push(root * deviation);
         }
-        sums.normal = Normal::from(normal);
-        sums
+        let square = square(&scratch.rows);
+        Sums {
+            normal: square.fixed_view::<UNKNOWNS, UNKNOWNS>(0, 0).into_owned(),
+            gradient: square.fixed_view::<UNKNOWNS, 1>(0, UNKNOWNS).into_owned(),
+            weight: weight_sum,
+            weighted_square: square[(UNKNOWNS, UNKNOWNS)],
+        }
     }
 
-    /// What is usual for blur and light, weighed as noise of `variance` weighs the pixels.
-    fn add_prior(&self, sums: &mut Sums, variance: f64) {
+    /// The derivative of light by the homography, from its gradient per cell.
+    fn by_homography(
+        &self,
+        place: &Vector2<f64>,
+        cell: &Vector2<f64>,
+        gradient: &Vector2<f64>,
+    ) -> [f64; BLUR] {
+        let h = &self.cells_from_chart;
+        let (x, y) = (place.x, place.y);
+        let w = 1.0 / (h.m31 * x + h.m32 * y + h.m33);
+        let (gx, gy, gw) = (gradient.x * w, gradient.y * w, -gradient.dot(cell) * w);
+        [gx * x, gx * y, gx, gy * x, gy * y, gy, gw * x, gw * y]
+    }
+
+    /// What is usual for blur and light, weighed as the noise weighs the pixels.
+    fn add_prior(&self, sums: &mut Sums) {
+        let variance = sums.variance();
         let contrast = self.light[3].abs().max(1.0);
         let mut add = |index: usize, deviation: f64, sigma: f64| {
             let weight = variance / (sigma * sigma);
@@ -367,13 +383,16 @@ fn limit(step: &Unknowns) -> f64 {
     (0.5 / step[BLUR].abs().max(1e-9)).min(1.0)
 }
 
-/// `normal += weight · row rowᵀ`; plain arrays, all of it, so that it becomes vector code.
-#[inline]
-fn accumulate(normal: &mut [[f64; UNKNOWNS]; UNKNOWNS], row: &[f64; UNKNOWNS], weight: f64) {
-    for (normal, entry) in normal.iter_mut().zip(row) {
-        let factor = weight * entry;
-        normal.iter_mut().zip(row).for_each(|(normal, entry)| *normal += factor * entry);
+/// Rᵀ R of the rows R, as a matrix product: that is vector code on any processor.
+fn square(rows: &[f64]) -> Square {
+    let count = rows.len() / COLUMNS;
+    let mut square = Square::zeros();
+    if count > 0 {
+        let columns = DMatrixView::from_slice(rows, COLUMNS, count);
+        let transposed = DMatrixView::from_slice_with_strides(rows, count, COLUMNS, COLUMNS, 1);
+        square.gemm(1.0, &columns, &transposed, 0.0);
     }
+    square
 }
 
 /// Tukey's biweight of a deviation that is cut off at 1.

@@ -105,8 +105,11 @@ impl Template {
     pub(super) fn is_near_edge(&self, place: Vector2<f64>, reach: Vector2<f64>) -> bool {
         let differ = |a: [f64; 2], b: [f64; 2]| self.color(a) != self.color(b);
         let (x, y) = (place.x, place.y);
-        (x - x.round()).abs() <= reach.x && differ([x.round() - 0.5, y], [x.round() + 0.5, y])
-            || (y - y.round()).abs() <= reach.y && differ([x, y.round() - 0.5], [x, y.round() + 0.5])
+        // Places on a tag are not below 0 by more than a cell: a cast rounds down what is a cell higher.
+        let nearest = |x: f64| f64::from((x + 1.5) as i32 - 1);
+        let (column, row) = (nearest(x), nearest(y));
+        (x - column).abs() <= reach.x && differ([column - 0.5, y], [column + 0.5, y])
+            || (y - row).abs() <= reach.y && differ([x, row - 0.5], [x, row + 0.5])
     }
 
     /// The colour of the cell at a place; beyond the tag, of the nearest cell.
@@ -122,12 +125,13 @@ impl Template {
         let correlation = (covariance.m12 / (sigma.x * sigma.y)).clamp(-0.98, 0.98);
         let rho = correlation.abs();
         let nodes: &[(f64, f64)] = match rho {
-            _ if rho < 0.02 => &ONE,
-            _ if rho < 0.45 => &THREE,
+            _ if rho < 0.15 => &ONE,
+            _ if rho < 0.5 => &THREE,
             _ => &SEVEN,
         };
         let along = Vector2::new(sigma.x, sigma.y * correlation.signum()) * rho.sqrt();
-        let across = sigma * (1.0 - rho).sqrt();
+        // Edges run along rows and columns: away from their ends, correlation is nothing to them.
+        let across = if nodes.len() == 1 { sigma } else { sigma * (1.0 - rho).sqrt() };
         let mut shade = Shade::default();
         for (node, weight) in nodes {
             let offset = along * *node;
