@@ -1,7 +1,6 @@
 //! Truth pictures as a session's camera: EXR in, recording, EXR out, to the bit; and what must fit them.
 #![allow(clippy::unwrap_used, reason = "helpers of tests panic as tests do")]
 
-#[allow(dead_code, reason = "each test binary uses a part")]
 mod support;
 
 use std::path::Path;

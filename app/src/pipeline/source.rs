@@ -19,6 +19,9 @@ const SHORTEST_STALL: Duration = Duration::from_millis(250);
 /// … and this for a camera without a rate of its own.
 const STALL_WITHOUT_RATE: Duration = Duration::from_secs(1);
 
+/// A camera that delivers for so long is well again: the next time it is lost, the pauses start small.
+const STEADY: Duration = Duration::from_secs(5);
+
 /// Opens a camera; again and again, if it must.
 pub type Opener = Box<dyn FnMut() -> Result<Box<dyn Camera>, CaptureError> + Send>;
 
@@ -63,6 +66,7 @@ pub fn run(source: Source, out: Outlet<Arrival>, options: Options, shared: &Shar
         shared,
         reporter: shared.events.reporter("camera"),
         backoff: Backoff::default(),
+        opened: clock::now(),
         numbers: Numbers::default(),
     };
     while !shared.stopped() {
@@ -86,6 +90,7 @@ struct SourceThread<'a> {
     shared: &'a Shared,
     reporter: Reporter,
     backoff: Backoff,
+    opened: Timestamp,
     quiet: Quiet,
     numbers: Numbers,
 }
@@ -128,7 +133,6 @@ impl SourceThread<'_> {
             self.damaged(&format!("{}: frame {} is damaged: {reason}", self.name, frame.sequence));
             return true;
         }
-        self.backoff.reset();
         self.shared.counters.frames_in.count();
         self.shared.counters.missing.add(self.numbers.missing_before(frame.sequence));
         match self.options.only_frame {
@@ -170,6 +174,9 @@ impl SourceThread<'_> {
 
     fn lost(&mut self, reason: &str) -> anyhow::Result<()> {
         self.camera = None;
+        if clock::now().saturating_since(self.opened) >= STEADY {
+            self.backoff.reset();
+        }
         self.shared.counters.lost.count();
         self.shared.counters.set_camera(CameraState::Lost);
         if self.options.retry == Retry::Never {
@@ -192,6 +199,7 @@ impl SourceThread<'_> {
         match opened {
             Ok(Ok(camera)) => {
                 self.numbers = Numbers::default();
+                self.opened = clock::now();
                 self.camera = Some(camera);
             }
             Ok(Err(error)) => self.reporter.report_often(Severity::Warning, "open", error),

@@ -221,6 +221,16 @@ fn a_camera_that_vanishes_is_opened_again_and_tracking_goes_on() {
 }
 
 #[test]
+fn a_camera_that_comes_and_goes_is_opened_ever_more_rarely() {
+    let once = || Some(Scripted::new([Frame, Lost]));
+    let camera = source(Scripted::new([Lost]), [once(), once(), Some(Scripted::new([Frame]))]);
+    let begun = clock::now();
+    let (_, finished) = run(camera, FirstPixel::default(), Options { retry: Retry::UntilStopped, ..EVERY });
+    assert_eq!(finished.metrics.lost, 3);
+    assert!(clock::now().saturating_since(begun) >= Duration::from_millis(250 + 500 + 1000));
+}
+
+#[test]
 fn a_file_that_breaks_off_is_not_read_twice() {
     let camera = source(Scripted::new([Frame, Frame, Lost]), [Some(Scripted::new([Frame]))]);
     let (numbers, finished) = run(camera, FirstPixel::default(), EVERY);

@@ -262,3 +262,60 @@ impl BodySummary {
         out
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, Vector3};
+
+    use super::*;
+
+    fn frame(number: u64, angle_deg: Option<f64>, warning: &str) -> FrameRow {
+        let body = |angle_deg: f64| {
+            let pose = Isometry3::rotation(Vector3::x() * angle_deg.to_radians()).into();
+            BodyRow {
+                name: "board.toml".to_owned(),
+                camera_from_body: pose,
+                measured_camera_from_body: pose,
+                position_std_mm: [0.0; 3],
+                rotation_std_deg: [0.0; 3],
+                rms_px: number as f64,
+                reduced_chi2: 1.0,
+                certainty: if number == 0 { "ambiguous" } else { "clear" },
+                other_camera_from_body: None,
+                tags_used: Vec::new(),
+                tags_rejected: Vec::new(),
+            }
+        };
+        FrameRow {
+            frame: number,
+            captured_ns: 0,
+            latency_ms: 0.0,
+            searched: true,
+            world_from_camera: None,
+            bodies: angle_deg.map(body).into_iter().collect(),
+            tags: Vec::new(),
+            warnings: vec![warning.to_owned()],
+        }
+    }
+
+    #[test]
+    fn jumps_are_counted_between_neighbouring_frames_only() {
+        let board = Body { name: "board.toml".to_owned(), tags: Vec::new() };
+        let mut tally = Tally::new(&[board]);
+        // 20 degrees are a motion, 40 are none; behind a gap nothing is known.
+        let angles = [Some(0.0), Some(20.0), Some(60.0), None, Some(0.0), Some(-29.0)];
+        for (number, angle_deg) in (0..).zip(angles) {
+            let warning = if number < 4 { format!("rms {number}.5 px") } else { "no tag".to_owned() };
+            tally.add(&frame(number, angle_deg, &warning));
+        }
+        let bodies = &tally.bodies[0].summary;
+        assert_eq!((bodies.frames, bodies.jumps), (5, 1));
+        let warnings: Vec<_> =
+            tally.warnings.values().map(|one| (one.message.as_str(), one.first_frame, one.count)).collect();
+        assert_eq!(warnings, [("no tag", 4, 2), ("rms 0.5 px", 0, 4)]);
+        let body = tally.bodies.remove(0).finish();
+        assert_eq!(body.certainty, BTreeMap::from([("ambiguous", 1), ("clear", 4)]));
+        // Of 0, 1, 2, 4, 5.
+        assert_eq!(body.rms_px, Some(Spread { median: 2.0, p95: 5.0, max: 5.0 }));
+    }
+}
