@@ -18,7 +18,7 @@ use coshade_lens::model::CameraModel;
 use nalgebra::Vector2;
 
 use crate::body::{Body, BodyError};
-use crate::detection::{Detection, TagObservation};
+use crate::detection::{Detection, TagId, TagObservation};
 use crate::detector::{Detector, DetectorError, FindTags, Region};
 use crate::history::PoseHistory;
 use crate::luma::Luma;
@@ -94,11 +94,24 @@ pub struct Tracker {
 const OUTLINE_ERROR_PX: f64 = 0.5;
 /// A tag that is followed must explain this much of the pixels' variance: nobody has read its bits.
 const MIN_FOLLOWED: f64 = 0.7;
+/// A tag that is followed is looked at with so many pixels at least.
+const MIN_FOLLOW_PIXELS: usize = 250;
 /// Parts of the image that are searched for lost tags, at most so many in an image: bounds the time.
 const MAX_REGIONS: usize = 2;
 /// Around the place where a tag should be, in sides of it, and in px at least.
 const REGION_SIDES: f64 = 0.75;
 const REGION_PX: f64 = 24.0;
+
+impl Tracking {
+    /// All observed corners.
+    pub fn observations(&self) -> Vec<TagObservation> {
+        self.tags.iter().map(|tag| tag.observation.clone()).collect()
+    }
+
+    fn has(&self, tag: TagId) -> bool {
+        self.tags.iter().any(|own| own.observation.tag == tag)
+    }
+}
 
 impl Tracker {
     /// A tracker for the images of a camera.
@@ -144,11 +157,9 @@ impl Tracker {
         if self.last_search.is_some_and(|last| captured < last) {
             self.forget();
         }
-        if self.settings.regions {
-            self.follow(image, captured, &mut tracking);
-        }
-        let due =
-            self.last_search.is_none_or(|last| captured.saturating_since(last) >= self.settings.search_every);
+        let lost = self.settings.regions && self.follow(image, captured, &mut tracking);
+        let every = if lost { self.settings.search_every / 2 } else { self.settings.search_every };
+        let due = self.last_search.is_none_or(|last| captured.saturating_since(last) >= every);
         if due || !self.settings.regions || tracking.tags.is_empty() {
             self.last_search = Some(captured);
             tracking.searched = true;
@@ -171,39 +182,93 @@ impl Tracker {
         self.bodies.iter().find(|own| own.name() == body).map(BodyTracker::history)
     }
 
-    /// Looks for tags where they should be.
-    fn follow(&mut self, image: &Luma, captured: Timestamp, tracking: &mut Tracking) {
+    /// Looks for tags where they should be. Returns whether one that was in view is missing.
+    fn follow(&mut self, image: &Luma, captured: Timestamp, tracking: &mut Tracking) -> bool {
         self.trails.retain(|trail| trail.is_remembered(captured));
         let mut expected: Vec<Expectation> =
             self.bodies.iter().flat_map(|body| body.expected_tags(&self.lens, image, captured)).collect();
-        let alone = self.trails.iter().map(|trail| trail.expect(captured));
-        for expectation in alone.collect::<Vec<_>>() {
-            let is_expected = |other: &Expectation| {
-                other.tag == expectation.tag && is_same_place(&other.corners_px, &expectation.corners_px)
-            };
-            if !expected.iter().any(is_expected) {
-                expected.push(expectation);
+        for trail in &self.trails {
+            let alone = trail.expect(captured);
+            if !expected.iter().any(|other| other.may_be(&alone)) {
+                expected.push(alone);
             }
         }
-        let mut lost = Vec::new();
-        for expectation in expected {
-            let Expectation { tag, corners_px } = expectation;
-            match self.refiner.refine_near(image, tag, &corners_px, self.settings.follow_pixels) {
+        let pixels = self.settings.follow_pixels / expected.len().max(1);
+        self.look(image, &expected, pixels, tracking);
+        let mut regions = MAX_REGIONS;
+        for index in 0..self.bodies.len() {
+            self.follow_body(index, image, &expected, pixels, &mut regions, tracking);
+        }
+        let ways = self.trails.iter().map(|trail| trail.expect(captured));
+        let lost: Vec<Expectation> = ways.filter(|expected| !tracking.has(expected.tag)).collect();
+        self.search_around(image, &lost, &mut regions, tracking);
+        lost.iter().any(|lost| !tracking.has(lost.tag))
+    }
+
+    /// Where the way of a body was not foreseen, one tag that is found tells where the others are.
+    fn follow_body(
+        &mut self,
+        index: usize,
+        image: &Luma,
+        expected: &[Expectation],
+        pixels: usize,
+        regions: &mut usize,
+        tracking: &mut Tracking,
+    ) {
+        let Some(body) = self.bodies.get(index) else { return };
+        let own = |tag: TagId| body.has(tag);
+        let lost: Vec<Expectation> = expected
+            .iter()
+            .filter(|expected| own(expected.tag) && !tracking.has(expected.tag))
+            .filter(|expected| self.trails.iter().any(|trail| trail.is(expected.tag)))
+            .copied()
+            .collect();
+        if lost.is_empty() {
+            return;
+        }
+        if !tracking.tags.iter().any(|tag| own(tag.observation.tag)) {
+            self.search_around(image, &lost, regions, tracking);
+        }
+        let again = self
+            .bodies
+            .get(index)
+            .map(|body| body.expected_again(&self.lens, image, &tracking.observations()));
+        let again: Vec<Expectation> =
+            again.into_iter().flatten().filter(|expected| !tracking.has(expected.tag)).collect();
+        self.look(image, &again, pixels, tracking);
+    }
+
+    /// Fits tags where they are expected.
+    fn look(&mut self, image: &Luma, expected: &[Expectation], pixels: usize, tracking: &mut Tracking) {
+        for Expectation { tag, corners_px } in expected {
+            match self.refiner.refine_near(image, *tag, corners_px, pixels.max(MIN_FOLLOW_PIXELS)) {
                 Ok(pattern) if pattern.explained >= MIN_FOLLOWED => {
                     tracking.tags.push(self.tracked(pattern.observation.clone(), None, Some(pattern)));
                 }
-                _ => lost.push(expectation),
+                _ => {}
             }
         }
-        // Those that were in view are worth a search.
-        lost.retain(|lost| self.trails.iter().any(|trail| trail.may_be(lost.tag, &lost.corners_px)));
-        for Expectation { tag, corners_px } in lost.into_iter().take(MAX_REGIONS) {
+    }
+
+    /// Searches the parts of the image around lost tags, the largest first.
+    fn search_around(
+        &mut self,
+        image: &Luma,
+        lost: &[Expectation],
+        regions: &mut usize,
+        tracking: &mut Tracking,
+    ) {
+        let mut lost = lost.to_vec();
+        lost.sort_by(|a, b| side_px(&b.corners_px).total_cmp(&side_px(&a.corners_px)));
+        for Expectation { tag, corners_px } in lost {
+            if tracking.has(tag) || *regions == 0 {
+                continue;
+            }
             let Some(region) = region_around(image, &corners_px) else { continue };
-            let found = self.detector.find_in(image, region).unwrap_or_default();
-            found
-                .into_iter()
-                .filter(|found| found.tag == tag)
-                .for_each(|found| self.take(image, &found, tracking));
+            *regions -= 1;
+            for found in self.detector.find_in(image, region).unwrap_or_default() {
+                self.take(image, &found, tracking);
+            }
         }
     }
 
@@ -260,8 +325,7 @@ impl Tracker {
     }
 
     fn solve(&mut self, captured: Timestamp, tracking: &mut Tracking) {
-        let observations: Vec<TagObservation> =
-            tracking.tags.iter().map(|tag| tag.observation.clone()).collect();
+        let observations = tracking.observations();
         for body in &mut self.bodies {
             match body.solve(captured, &observations) {
                 Ok(Some(tracked)) => tracking.bodies.push(tracked),

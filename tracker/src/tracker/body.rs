@@ -63,10 +63,28 @@ impl BodyTracker {
         self.body.tag(tag).map(|tag| tag.size_m)
     }
 
+    pub(super) fn has(&self, tag: TagId) -> bool {
+        self.body.tag(tag).is_some()
+    }
+
     /// Its tags where its way leads.
     pub(super) fn expected_tags(&self, lens: &CameraModel, image: &Luma, now: Timestamp) -> Vec<Expectation> {
-        let predicted = self.history.predict(now);
+        let last = || self.history.latest().copied().filter(|last| is_recent(last.stamp, now));
+        let predicted = self.history.predict(now).or_else(last);
         predicted.map_or_else(Vec::new, |pose| expected_tags(lens, image, &self.body, &pose.camera_from_body))
+    }
+
+    /// Its tags where those that were found so far put them.
+    pub(super) fn expected_again(
+        &self,
+        lens: &CameraModel,
+        image: &Luma,
+        observations: &[TagObservation],
+    ) -> Vec<Expectation> {
+        let pose = self.solver.solve(observations, &Past::default()).ok();
+        pose.map_or_else(Vec::new, |pose| {
+            expected_tags(lens, image, &self.body, &pose.estimate.camera_from_body)
+        })
     }
 
     /// Its pose, `None` if none of its tags is in view.
@@ -114,6 +132,13 @@ impl BodyTracker {
         });
         Past { expected, before }
     }
+}
+
+/// A pose that is older says nothing of where to look.
+const RECENT_NS: i64 = 500_000_000;
+
+fn is_recent(stamp: Timestamp, now: Timestamp) -> bool {
+    (0..=RECENT_NS).contains(&now.signed_ns_since(stamp))
 }
 
 /// Over longer times no motion is steady enough to tell how rows moved.

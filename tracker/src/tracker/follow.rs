@@ -32,6 +32,13 @@ pub(super) struct Trail {
     velocity: [Vector2<f64>; 4],
 }
 
+impl Expectation {
+    /// Whether both are of the same tag in the same place.
+    pub(super) fn may_be(&self, other: &Self) -> bool {
+        self.tag == other.tag && is_same_place(&self.corners_px, &other.corners_px)
+    }
+}
+
 impl Trail {
     pub(super) fn new(tag: TagId, seen: Timestamp, corners_px: [Vector2<f64>; 4]) -> Self {
         Self { tag, seen, corners_px, velocity: [Vector2::zeros(); 4] }
@@ -56,6 +63,10 @@ impl Trail {
     /// Whether something seen at `corners_px` may be this tag.
     pub(super) fn may_be(&self, tag: TagId, corners_px: &[Vector2<f64>; 4]) -> bool {
         self.tag == tag && is_same_place(&self.corners_px, corners_px)
+    }
+
+    pub(super) fn is(&self, tag: TagId) -> bool {
+        self.tag == tag
     }
 
     /// Where it should be if it went on as it did.

@@ -14,7 +14,8 @@ pub struct TrackerSettings {
     pub refine: RefineSettings,
     /// Look for tags only where they should be, and in the whole image now and then.
     pub regions: bool,
-    /// With `regions`: pixels that are looked at on a tag that is followed. Higher: more exact. Lower: faster.
+    /// With `regions`: pixels that are looked at on all tags together that are followed, at least 250 on each. Higher: more
+    /// exact. Lower: faster.
     pub follow_pixels: usize,
     /// With `regions`: time from one search of the whole image to the next. Higher: less work. Lower: what is new in view is
     /// found sooner.
@@ -29,7 +30,7 @@ impl Default for TrackerSettings {
             detector: DetectorSettings::default(),
             refine: RefineSettings::default(),
             regions: true,
-            follow_pixels: 1500,
+            follow_pixels: 4000,
             search_every: Duration::from_millis(150),
             filter: true,
         }
