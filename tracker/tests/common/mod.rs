@@ -95,9 +95,18 @@ pub fn picture(lens: &CameraModel, size_px: [u32; 2], tags: &[PlacedTag], look: 
         }
     }
     let light = blurred(&light, width, look.blur_px);
-    let mut random = Random(look.seed);
-    let pixels =
-        light.iter().map(|light| (light + look.noise * random.normal()).round().clamp(0.0, 255.0) as u8);
+    coded(&light, size_px, look.noise, look.seed)
+}
+
+/// The same picture taken again, with other noise, in codes.
+pub fn noisy(picture: &Picture, noise: f64, seed: u64) -> Picture {
+    let light: Vec<f64> = picture.pixels.iter().map(|code| f64::from(*code)).collect();
+    coded(&light, picture.size_px, noise, seed)
+}
+
+fn coded(light: &[f64], size_px: [u32; 2], noise: f64, seed: u64) -> Picture {
+    let mut random = Random(seed);
+    let pixels = light.iter().map(|light| (light + noise * random.normal()).round().clamp(0.0, 255.0) as u8);
     Picture { pixels: pixels.collect(), size_px }
 }
 
