@@ -15,7 +15,7 @@ use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 const TAG: TagId = TagId { family: Family::Tag36h11, id: 42 };
 const SIZE_M: f64 = 0.1;
 const SIZE_PX: [u32; 2] = [400, 400];
-const TAGS: usize = 30;
+const TAGS: usize = 16;
 
 struct Lens {
     name: &'static str,
@@ -63,7 +63,6 @@ fn placed(random: &mut Random, off_axis_deg: f64) -> PlacedTag {
     PlacedTag { tag: TAG, size_m: SIZE_M, camera_from_tag }
 }
 
-/// Root of the median of squared errors in a corner's place, in pixels.
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values[values.len() / 2]
@@ -107,13 +106,10 @@ fn tags_are_found_and_exact_through_every_lens() {
         );
         figures.push((name, found, px, deg, part));
     }
-    let (_, _, corner_px, turn_deg, shift) = figures[0];
     for (name, found, px, deg, part) in figures {
-        assert!(found + 2 >= TAGS, "{name}: {found} of {TAGS}");
-        // The same bar for all; twice the pinhole's median is beyond the spread of 30 tags' medians.
-        assert!(
-            px < 2.0 * corner_px && deg < 2.0 * turn_deg && part < 2.5 * shift,
-            "{name}: {px} px, {deg}°, {part}"
-        );
+        assert!(found + 1 >= TAGS, "{name}: {found} of {TAGS}");
+        // 0.7 times what corners of the AprilTag library and OpenCV's IPPE reach with a pinhole (`tests/peers/tags.py`):
+        // medians of 0.16° and 0.055 % of the distance.
+        assert!(px < 0.05 && deg < 0.11 && part < 0.000_39, "{name}: {px} px, {deg}°, {part}");
     }
 }
