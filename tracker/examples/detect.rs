@@ -15,6 +15,7 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::time::Duration;
 
 use coshade_lens::response::Response;
 use coshade_tracker::detector::{Detector, DetectorSettings, FindTags, Region};
@@ -164,8 +165,10 @@ fn fastest<T, E>(repeat: u32, mut run: impl FnMut() -> Result<T, E>) -> Result<(
     Ok((result, best))
 }
 
-/// What all threads of this process have computed, from Linux's scheduler.
+/// What all threads of this process have computed, from Linux's scheduler. It adds up when a thread pauses, else a few times
+/// per 10 ms.
 fn cpu_ms() -> Option<f64> {
+    std::thread::sleep(Duration::from_micros(1));
     let tasks = std::fs::read_dir("/proc/self/task").ok()?;
     let nanoseconds = tasks.map(|task| {
         let text = std::fs::read_to_string(task.ok()?.path().join("schedstat")).ok()?;

@@ -3,7 +3,7 @@
 use crate::luma::Luma;
 
 /// Pixels that are looked at, about.
-const SAMPLES: f64 = 20_000.0;
+const SAMPLES: f64 = 5_000.0;
 
 /// Standard deviation of the noise, in codes: the lower quartile of what the Laplacian of Immerkær (*Fast Noise Variance
 /// Estimation*, CVIU 1996) leaves of the image. Edges and texture are left as well, noise alone everywhere: a part of an image
@@ -70,8 +70,8 @@ mod tests {
                 })
                 .collect();
             let found = noise(&Luma::new(&pixels, 400, 300, 400).unwrap());
-            // 20 000 samples, neighbours correlated; rounding adds 0.29.
-            assert!((found - sigma).abs() < 0.35 + 0.03 * sigma, "{sigma}: {found}");
+            // 5000 samples, whose quartile is known to 2 %; rounding adds 0.29.
+            assert!((found - sigma).abs() < 0.35 + 0.06 * sigma, "{sigma}: {found}");
         }
         assert_eq!(noise(&Luma::new(&[9; 4], 2, 2, 2).unwrap()), 0.0);
     }
