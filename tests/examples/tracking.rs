@@ -2,6 +2,8 @@
 //!
 //!     cargo run -p coshade-tests --example tracking [-- --no-filter --full-frame]
 
+#![allow(clippy::print_stdout, reason = "a report")]
+
 use anyhow::Result;
 use clap::Parser;
 use coshade_tests::tracking::{self, Figures};
@@ -30,7 +32,9 @@ fn main() -> Result<()> {
             println!("{frame:?}");
         }
     }
-    println!("body           frames  mm median/95 %     deg median/95 %   overlay px median/95 %   ambiguous  flips");
+    println!(
+        "body           frames  mm median/95 %     deg median/95 %   overlay px median/95 %   ambiguous  flips"
+    );
     for body in &tracked {
         let Figures { translation_mm, rotation_deg, overlay_px } = body.figures();
         println!(

@@ -64,7 +64,9 @@ impl BodyTruth {
         let percentiles = |value: fn(&FrameError) -> f64| {
             let mut values: Vec<f64> = self.frames.iter().map(value).collect();
             values.sort_by(f64::total_cmp);
-            [50, 95].map(|percent| values.get((values.len().max(1) - 1) * percent / 100).copied().unwrap_or(f64::NAN))
+            [50, 95].map(|percent| {
+                values.get((values.len().max(1) - 1) * percent / 100).copied().unwrap_or(f64::NAN)
+            })
         };
         Figures {
             translation_mm: percentiles(|frame| frame.translation_mm),
@@ -111,7 +113,8 @@ pub fn desk(settings: TrackerSettings) -> Result<Vec<BodyTruth>, TrackingError> 
         converter.grey(&frame, &mut codes).map_err(failed)?;
         let image = Luma::new(&codes, frame.width_px, frame.height_px, frame.width_px).map_err(failed)?;
         let tracking = tracker.track(&image, frame.captured);
-        let world_from_camera = pose_at(&poses, frame.captured).ok_or_else(|| failed("a frame without a pose"))?;
+        let world_from_camera =
+            pose_at(&poses, frame.captured).ok_or_else(|| failed("a frame without a pose"))?;
         for tracked in &tracking.bodies {
             for ((body, world_from_body), truth) in bodies.iter().zip(&mut truths) {
                 if body.name == tracked.name {
@@ -131,7 +134,8 @@ fn error(
     camera_from_body: &Isometry3<f64>,
 ) -> Option<FrameError> {
     let found = &tracked.camera_from_body;
-    let corner = |i: u32| Point3::from([i & 1, i >> 1 & 1, i >> 2 & 1].map(|side| 0.1 * (f64::from(side) - 0.5)));
+    let corner =
+        |i: u32| Point3::from([i & 1, i >> 1 & 1, i >> 2 & 1].map(|side| 0.1 * (f64::from(side) - 0.5)));
     let mut squares = 0.0;
     for corner in (0..8).map(corner) {
         let place = |pose: &Isometry3<f64>| lens.project(&(pose * corner).coords);
