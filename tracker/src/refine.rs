@@ -113,6 +113,8 @@ struct Stage {
     /// Deviations that are tolerated in the first step, as a fraction of the contrast. Corners that are a cell off deviate
     /// by much.
     tolerated: f64,
+    /// Whether the shape of the blur is only about right.
+    fast: bool,
 }
 
 /// A pixel to be explained.
@@ -185,8 +187,9 @@ impl Refiner {
             max_iterations,
             converged_px: 0.1,
             tolerated: 0.24,
+            fast: true,
         };
-        let fine = Stage { max_pixels, converged_px: 0.02, tolerated: TOLERATED, ..coarse };
+        let fine = Stage { max_pixels, converged_px: 0.02, tolerated: TOLERATED, fast: false, ..coarse };
         self.run(image, tag, corners_px, &[coarse, fine])
     }
 
@@ -203,7 +206,7 @@ impl Refiner {
         max_pixels: usize,
     ) -> Result<Refined, RefineError> {
         let max_iterations = self.settings.max_iterations;
-        let near = Stage { max_pixels, max_iterations, converged_px: 0.04, tolerated: 0.12 };
+        let near = Stage { max_pixels, max_iterations, converged_px: 0.04, tolerated: 0.06, fast: false };
         self.run(image, tag, corners_px, &[near])
     }
 

@@ -118,14 +118,15 @@ impl Template {
         self.white.get(cell(y) * self.cells + cell(x))
     }
 
-    /// The tag at a `place` (column, row) under a blur of `covariance`, both in cells.
-    pub(super) fn shade(&self, place: Vector2<f64>, covariance: &Matrix2<f64>) -> Shade {
+    /// The tag at a `place` (column, row) under a blur of `covariance`, both in cells. Fast: without the correlation of the
+    /// blur, which matters where edges meet.
+    pub(super) fn shade(&self, place: Vector2<f64>, covariance: &Matrix2<f64>, fast: bool) -> Shade {
         let sigma =
             Vector2::new(covariance.m11.sqrt(), covariance.m22.sqrt()).sup(&Vector2::repeat(MIN_SIGMA));
         let correlation = (covariance.m12 / (sigma.x * sigma.y)).clamp(-0.98, 0.98);
         let rho = correlation.abs();
         let nodes: &[(f64, f64)] = match rho {
-            _ if rho < 0.15 => &ONE,
+            _ if fast || rho < 0.15 => &ONE,
             _ if rho < 0.5 => &THREE,
             _ => &SEVEN,
         };
