@@ -27,6 +27,12 @@ pub trait FindTags: Send {
     /// system has none.
     fn find(&mut self, image: &Luma) -> Result<Vec<Detection>, DetectorError>;
 
+    /// Tags in view that can be found in an image `decimate` times smaller: faster, without the small ones.
+    ///
+    /// # Errors
+    /// As [`find`](Self::find).
+    fn find_coarsely(&mut self, image: &Luma, decimate: u32) -> Result<Vec<Detection>, DetectorError>;
+
     /// Tags within a part of the image, in coordinates of the whole image. Where the part reaches beyond the image, it is
     /// cut.
     ///
@@ -184,6 +190,16 @@ impl Detector {
 }
 
 impl FindTags for Detector {
+    fn find_coarsely(&mut self, image: &Luma, decimate: u32) -> Result<Vec<Detection>, DetectorError> {
+        let own = self.settings.decimate;
+        self.settings.decimate = own.max(decimate.clamp(1, 16) as f32);
+        self.configure();
+        let found = self.find(image);
+        self.settings.decimate = own;
+        self.configure();
+        found
+    }
+
     fn find(&mut self, image: &Luma) -> Result<Vec<Detection>, DetectorError> {
         if !self.prepare(image)? {
             return Ok(Vec::new());

@@ -11,24 +11,27 @@
 mod body;
 mod follow;
 mod settings;
+mod sight;
+
+use std::time::Duration;
 
 use coshade_capture::Timestamp;
 use coshade_lens::calibration::Calibration;
 use coshade_lens::model::CameraModel;
-use nalgebra::Vector2;
 
 use crate::body::{Body, BodyError};
-use crate::detection::{Detection, TagId, TagObservation};
-use crate::detector::{Detector, DetectorError, FindTags, Region};
+use crate::detection::{TagId, TagObservation};
+use crate::detector::{Detector, DetectorError, FindTags};
 use crate::history::PoseHistory;
 use crate::luma::Luma;
-use crate::planar::{PlanarPose, planar_poses};
+use crate::planar::PlanarPose;
 use crate::pose::PoseError;
-use crate::refine::{RefineError, Refined, Refiner};
+use crate::refine::{Refined, Refiner};
 use body::BodyTracker;
 pub use body::TrackedBody;
-use follow::{Expectation, Trail, is_same_place, side_px};
+use follow::{Expectation, Trail};
 pub use settings::TrackerSettings;
+use sight::Sight;
 
 /// Why there is no tracker.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -88,19 +91,17 @@ pub struct Tracker {
     settings: TrackerSettings,
     trails: Vec<Trail>,
     last_search: Option<Timestamp>,
+    last_thorough: Option<Timestamp>,
 }
 
-/// Standard error of corners that only the detector's outline tells, in px.
-const OUTLINE_ERROR_PX: f64 = 0.5;
-/// A tag that is followed must explain this much of the pixels' variance: nobody has read its bits.
-const MIN_FOLLOWED: f64 = 0.7;
-/// A tag that is followed is looked at with so many pixels at least.
-const MIN_FOLLOW_PIXELS: usize = 250;
-/// Parts of the image that are searched for lost tags, at most so many in an image: bounds the time.
-const MAX_REGIONS: usize = 2;
-/// Around the place where a tag should be, in sides of it, and in px at least.
-const REGION_SIDES: f64 = 0.75;
-const REGION_PX: f64 = 24.0;
+/// How long a tag that is out of sight is looked for where its way would lead, and how long it is missed.
+const FOLLOWED: Duration = Duration::from_millis(500);
+const MISSED: Duration = Duration::from_secs(2);
+/// A tag that was seen so shortly ago was in the last frame or the one before.
+const LAST_FRAME: Duration = Duration::from_millis(120);
+/// Searches for tags that are missing, and for new ones, are made in images so many times smaller.
+const DECIMATE_FOR_MISSING: u32 = 2;
+const DECIMATE_FOR_NEW: u32 = 4;
 
 impl Tracking {
     /// All observed corners.
@@ -147,23 +148,31 @@ impl Tracker {
             settings,
             trails: Vec::new(),
             last_search: None,
+            last_thorough: None,
         })
     }
 
     /// What is seen in `image`, the middle row of which was exposed at `captured`.
     pub fn track(&mut self, image: &Luma, captured: Timestamp) -> Tracking {
-        let mut tracking = Tracking::default();
         // A stamp that goes back is the beginning of another sequence.
         if self.last_search.is_some_and(|last| captured < last) {
             self.forget();
         }
-        let lost = self.settings.regions && self.follow(image, captured, &mut tracking);
-        let every = if lost { self.settings.search_every / 2 } else { self.settings.search_every };
-        let due = self.last_search.is_none_or(|last| captured.saturating_since(last) >= every);
-        if due || !self.settings.regions || tracking.tags.is_empty() {
+        self.trails.retain(|trail| trail.was_in(captured, MISSED));
+        let mut sight =
+            Sight::new(image, &self.lens, self.detector.as_mut(), &mut self.refiner, &self.bodies);
+        if self.settings.regions {
+            let trails = self.trails.iter().filter(|trail| trail.was_in(captured, FOLLOWED));
+            let alone: Vec<Expectation> = trails.map(|trail| trail.expect(captured)).collect();
+            sight.follow(captured, &alone, self.settings.follow_pixels);
+        }
+        let mut tracking = sight.into_tracking();
+        if let Some(decimate) = self.due(image, captured, &tracking) {
             self.last_search = Some(captured);
-            tracking.searched = true;
-            self.search(image, &mut tracking);
+            let mut sight =
+                Sight::new(image, &self.lens, self.detector.as_mut(), &mut self.refiner, &self.bodies);
+            sight.search(decimate, tracking);
+            tracking = sight.into_tracking();
         }
         self.remember(captured, &tracking.tags);
         self.solve(captured, &mut tracking);
@@ -173,7 +182,7 @@ impl Tracker {
     /// Forgets all earlier images.
     pub fn forget(&mut self) {
         self.trails.clear();
-        self.last_search = None;
+        (self.last_search, self.last_thorough) = (None, None);
         self.bodies.iter_mut().for_each(BodyTracker::forget);
     }
 
@@ -182,134 +191,22 @@ impl Tracker {
         self.bodies.iter().find(|own| own.name() == body).map(BodyTracker::history)
     }
 
-    /// Looks for tags where they should be. Returns whether one that was in view is missing.
-    fn follow(&mut self, image: &Luma, captured: Timestamp, tracking: &mut Tracking) -> bool {
-        self.trails.retain(|trail| trail.is_remembered(captured));
-        let mut expected: Vec<Expectation> =
-            self.bodies.iter().flat_map(|body| body.expected_tags(&self.lens, image, captured)).collect();
-        for trail in &self.trails {
-            let alone = trail.expect(captured);
-            if !expected.iter().any(|other| other.may_be(&alone)) {
-                expected.push(alone);
-            }
+    /// Whether the whole image is to be searched now, and how many times smaller.
+    fn due(&mut self, image: &Luma, captured: Timestamp, tracking: &Tracking) -> Option<u32> {
+        let elapsed = |last: Option<Timestamp>| last.map(|last| captured.saturating_since(last));
+        let TrackerSettings { regions, search_every, search_thoroughly_every, .. } = self.settings;
+        let all_lost =
+            tracking.tags.is_empty() && self.trails.iter().any(|trail| trail.was_in(captured, LAST_FRAME));
+        if regions && !all_lost && elapsed(self.last_search).is_some_and(|elapsed| elapsed < search_every) {
+            return None;
         }
-        let pixels = self.settings.follow_pixels / expected.len().max(1);
-        self.look(image, &expected, pixels, tracking);
-        let mut regions = MAX_REGIONS;
-        for index in 0..self.bodies.len() {
-            self.follow_body(index, image, &expected, pixels, &mut regions, tracking);
+        let is_missing = |trail: &Trail| !tracking.has(trail.tag()) && trail.should_be_in(image, captured);
+        if !regions || elapsed(self.last_thorough).is_none_or(|elapsed| elapsed >= search_thoroughly_every) {
+            self.last_thorough = Some(captured);
+            return Some(1);
         }
-        let ways = self.trails.iter().map(|trail| trail.expect(captured));
-        let lost: Vec<Expectation> = ways.filter(|expected| !tracking.has(expected.tag)).collect();
-        self.search_around(image, &lost, &mut regions, tracking);
-        lost.iter().any(|lost| !tracking.has(lost.tag))
-    }
-
-    /// Where the way of a body was not foreseen, one tag that is found tells where the others are.
-    fn follow_body(
-        &mut self,
-        index: usize,
-        image: &Luma,
-        expected: &[Expectation],
-        pixels: usize,
-        regions: &mut usize,
-        tracking: &mut Tracking,
-    ) {
-        let Some(body) = self.bodies.get(index) else { return };
-        let own = |tag: TagId| body.has(tag);
-        let lost: Vec<Expectation> = expected
-            .iter()
-            .filter(|expected| own(expected.tag) && !tracking.has(expected.tag))
-            .filter(|expected| self.trails.iter().any(|trail| trail.is(expected.tag)))
-            .copied()
-            .collect();
-        if lost.is_empty() {
-            return;
-        }
-        if !tracking.tags.iter().any(|tag| own(tag.observation.tag)) {
-            self.search_around(image, &lost, regions, tracking);
-        }
-        let again = self
-            .bodies
-            .get(index)
-            .map(|body| body.expected_again(&self.lens, image, &tracking.observations()));
-        let again: Vec<Expectation> =
-            again.into_iter().flatten().filter(|expected| !tracking.has(expected.tag)).collect();
-        self.look(image, &again, pixels, tracking);
-    }
-
-    /// Fits tags where they are expected.
-    fn look(&mut self, image: &Luma, expected: &[Expectation], pixels: usize, tracking: &mut Tracking) {
-        for Expectation { tag, corners_px } in expected {
-            match self.refiner.refine_near(image, *tag, corners_px, pixels.max(MIN_FOLLOW_PIXELS)) {
-                Ok(pattern) if pattern.explained >= MIN_FOLLOWED => {
-                    tracking.tags.push(self.tracked(pattern.observation.clone(), None, Some(pattern)));
-                }
-                _ => {}
-            }
-        }
-    }
-
-    /// Searches the parts of the image around lost tags, the largest first.
-    fn search_around(
-        &mut self,
-        image: &Luma,
-        lost: &[Expectation],
-        regions: &mut usize,
-        tracking: &mut Tracking,
-    ) {
-        let mut lost = lost.to_vec();
-        lost.sort_by(|a, b| side_px(&b.corners_px).total_cmp(&side_px(&a.corners_px)));
-        for Expectation { tag, corners_px } in lost {
-            if tracking.has(tag) || *regions == 0 {
-                continue;
-            }
-            let Some(region) = region_around(image, &corners_px) else { continue };
-            *regions -= 1;
-            for found in self.detector.find_in(image, region).unwrap_or_default() {
-                self.take(image, &found, tracking);
-            }
-        }
-    }
-
-    /// Looks for tags in the whole image.
-    fn search(&mut self, image: &Luma, tracking: &mut Tracking) {
-        match self.detector.find(image) {
-            Ok(found) => found.iter().for_each(|found| self.take(image, found, tracking)),
-            Err(error) => tracking.warnings.push(error.to_string()),
-        }
-    }
-
-    /// Takes in what the detector found, unless it is there already.
-    fn take(&mut self, image: &Luma, found: &Detection, tracking: &mut Tracking) {
-        let Detection { tag, corners_px, hamming, margin } = found;
-        let is_this = |other: &TrackedTag| {
-            other.observation.tag == *tag && is_same_place(&other.observation.corners_px, corners_px)
-        };
-        if tracking.tags.iter().any(is_this) {
-            return;
-        }
-        let how = Some(Found { hamming: *hamming, margin: *margin });
-        match self.refiner.refine(image, *tag, corners_px) {
-            Ok(pattern) => tracking.tags.push(self.tracked(pattern.observation.clone(), how, Some(pattern))),
-            // Read without an error it is a tag, of which something covers much, or which is bent.
-            Err(RefineError::Unlike { .. } | RefineError::Lost) if *hamming == 0 => {
-                let observation = TagObservation::from_detection(found, OUTLINE_ERROR_PX);
-                tracking.tags.push(self.tracked(observation, how, None));
-            }
-            Err(error) => tracking.warnings.push(format!("{tag} was found and is not used: {error}")),
-        }
-    }
-
-    fn tracked(
-        &self,
-        observation: TagObservation,
-        found: Option<Found>,
-        pattern: Option<Refined>,
-    ) -> TrackedTag {
-        let size_m = self.bodies.iter().find_map(|body| body.size_m(observation.tag));
-        let poses = size_m.and_then(|size_m| planar_poses(&self.lens, &observation, size_m).ok());
-        TrackedTag { observation, found, pattern, poses }
+        let missing = tracking.tags.is_empty() || self.trails.iter().any(is_missing);
+        Some(if missing { DECIMATE_FOR_MISSING } else { DECIMATE_FOR_NEW })
     }
 
     /// Where tags were, for the next image.
@@ -334,20 +231,4 @@ impl Tracker {
             }
         }
     }
-}
-
-/// A part of the image in which a lost tag should be.
-fn region_around(image: &Luma, corners_px: &[Vector2<f64>; 4]) -> Option<Region> {
-    let margin = (REGION_SIDES * side_px(corners_px)).max(REGION_PX);
-    let low =
-        corners_px.iter().fold(corners_px[0], |low, corner| low.inf(corner)).map(|x| (x - margin).max(0.0));
-    let high = corners_px.iter().fold(corners_px[0], |high, corner| high.sup(corner)).map(|x| x + margin);
-    let last = Vector2::new(f64::from(image.width_px()), f64::from(image.height_px()));
-    let size = high.inf(&last) - low;
-    (size.x >= 1.0 && size.y >= 1.0).then(|| Region {
-        x_px: low.x as u32,
-        y_px: low.y as u32,
-        width_px: size.x.ceil() as u32,
-        height_px: size.y.ceil() as u32,
-    })
 }

@@ -1,19 +1,20 @@
 //! Where tags should be in the next image.
 
+use std::time::Duration;
+
 use coshade_capture::Timestamp;
 use coshade_lens::model::CameraModel;
 use nalgebra::{Isometry3, Vector2};
 
+use super::{TrackedTag, Tracking};
 use crate::body::Body;
-use crate::detection::TagId;
+use crate::detection::{TagId, TagObservation};
 use crate::luma::Luma;
 
 /// Tags seen flatter than this are not looked for: the cosine of 80° between the print's normal and the line of sight.
 const MIN_FACING: f64 = 0.17;
 /// Tags smaller than this are not looked for.
 const MIN_SIDE_PX: f64 = 10.0;
-/// A tag that has not been seen for so long is left to the search of the whole image.
-const REMEMBERED_NS: i64 = 500_000_000;
 
 /// A tag and where it should be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,8 +57,16 @@ impl Trail {
         *self = Self { tag: self.tag, seen, corners_px, velocity };
     }
 
-    pub(super) fn is_remembered(&self, now: Timestamp) -> bool {
-        (0..=REMEMBERED_NS).contains(&now.signed_ns_since(self.seen))
+    /// Whether it was seen within a time before `now`.
+    pub(super) fn was_in(&self, now: Timestamp, time: Duration) -> bool {
+        (0..=time.as_nanos() as i64).contains(&now.signed_ns_since(self.seen))
+    }
+
+    /// Whether it should be in view if it went on as it did, or stayed where it was: if not, it has left.
+    pub(super) fn should_be_in(&self, image: &Luma, now: Timestamp) -> bool {
+        let last = Vector2::new(f64::from(image.width_px()), f64::from(image.height_px()));
+        let inside = |px: &Vector2<f64>| px.x > 0.0 && px.y > 0.0 && px.x < last.x && px.y < last.y;
+        self.corners_px.iter().all(inside) && self.expect(now).corners_px.iter().all(inside)
     }
 
     /// Whether something seen at `corners_px` may be this tag.
@@ -65,8 +74,8 @@ impl Trail {
         self.tag == tag && is_same_place(&self.corners_px, corners_px)
     }
 
-    pub(super) fn is(&self, tag: TagId) -> bool {
-        self.tag == tag
+    pub(super) fn tag(&self) -> TagId {
+        self.tag
     }
 
     /// Where it should be if it went on as it did.
@@ -80,9 +89,35 @@ impl Trail {
     }
 }
 
+/// How far tags that were found strayed from where they were expected: mostly because the camera turned otherwise than
+/// foreseen, which moves neighbours alike.
+pub(super) struct Strays(Vec<(Vector2<f64>, Vector2<f64>)>);
+
+impl Strays {
+    pub(super) fn new(expected: &[Expectation], tracking: &Tracking) -> Self {
+        let stray = |found: &TrackedTag| {
+            let TagObservation { tag, corners_px, .. } = &found.observation;
+            let expected = expected.iter().find(|expected| expected.tag == *tag)?;
+            Some((middle(corners_px), middle(corners_px) - middle(&expected.corners_px)))
+        };
+        Self(tracking.tags.iter().filter_map(stray).collect())
+    }
+
+    /// Where a tag should be after all, by the nearest one that was found.
+    pub(super) fn correct(&self, expected: &Expectation) -> Option<Expectation> {
+        let here = middle(&expected.corners_px);
+        let distance = |stray: &&(Vector2<f64>, Vector2<f64>)| (stray.0 - here).norm();
+        let (_, stray) = self.0.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+        Some(Expectation { corners_px: expected.corners_px.map(|corner| corner + stray), ..*expected })
+    }
+}
+
+fn middle(corners: &[Vector2<f64>; 4]) -> Vector2<f64> {
+    corners.iter().sum::<Vector2<f64>>() / 4.0
+}
+
 /// Whether the middles of two outlines are nearer to each other than their sides are long.
 pub(super) fn is_same_place(a: &[Vector2<f64>; 4], b: &[Vector2<f64>; 4]) -> bool {
-    let middle = |corners: &[Vector2<f64>; 4]| corners.iter().sum::<Vector2<f64>>() / 4.0;
     (middle(a) - middle(b)).norm() < side_px(a).max(side_px(b))
 }
 
@@ -138,7 +173,8 @@ mod tests {
             assert!((found - wanted).norm() < 1e-9);
         }
         assert!(trail.may_be(TAG, &square(20.0, 15.0)) && !trail.may_be(TAG, &square(60.0, 10.0)));
-        assert!(trail.is_remembered(at(500)) && !trail.is_remembered(at(600)));
+        let half = Duration::from_millis(500);
+        assert!(trail.was_in(at(500), half) && !trail.was_in(at(600), half));
         // A stamp that goes back is no reason for a guess.
         trail.advance(at(10), square(0.0, 0.0));
         assert_eq!(trail.expect(at(50)).corners_px, square(0.0, 0.0));
