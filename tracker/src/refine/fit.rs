@@ -224,7 +224,8 @@ impl<'a> Fit<'a> {
         let (mut n, mut t, mut tt, mut l, mut tl) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for sample in samples {
             let (cell, by_place) = self.cell(&sample.place)?;
-            let value = self.template.shade(cell, &self.covariance(&(by_place * sample.by_px)), self.fast).value;
+            let value =
+                self.template.shade(cell, &self.covariance(&(by_place * sample.by_px)), self.fast).value;
             n += 1.0;
             t += value;
             tt += value * value;
