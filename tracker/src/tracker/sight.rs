@@ -19,6 +19,8 @@ const OUTLINE_ERROR_PX: f64 = 0.5;
 const MIN_FOLLOWED: f64 = 0.7;
 /// A tag that is followed is looked at with so many pixels at least.
 const MIN_FOLLOW_PIXELS: usize = 250;
+/// The same of a tag that its body tells of after a search.
+const COMPLETING_PIXELS: usize = 1500;
 /// Parts of the image that are searched for lost tags, at most so many in an image: bounds the time.
 const MAX_REGIONS: usize = 8;
 /// Around the place where a tag should be, in sides of it, and in px at least.
@@ -57,7 +59,7 @@ impl<'a> Sight<'a> {
             bodies,
             tracking,
             expected: Vec::new(),
-            pixels: 0,
+            pixels: COMPLETING_PIXELS,
             regions: MAX_REGIONS,
         }
     }
@@ -96,6 +98,12 @@ impl<'a> Sight<'a> {
             let missing = self.look_again(seen);
             self.search_around(&missing, 1);
         }
+        self.complete(body);
+    }
+
+    /// Looks for the tags of a body where those that were found put them: also for those that no detector reads, because they
+    /// are small or seen flat.
+    fn complete(&mut self, body: &BodyTracker) {
         let again = body.expected_again(self.lens, self.image, &self.tracking.observations());
         self.look(&again);
     }
@@ -151,6 +159,7 @@ impl<'a> Sight<'a> {
             Ok(found) => found.iter().for_each(|found| self.take(found)),
             Err(error) => self.tracking.warnings.push(error.to_string()),
         }
+        self.bodies.iter().for_each(|body| self.complete(body));
     }
 
     /// Takes in what the detector found, unless it is there already.
