@@ -15,6 +15,7 @@
 //! | [`filter`] | poses without jitter and without lag |
 //! | [`history`] | poses of the near past, at any moment in it |
 //! | [`tracker`] | all of it together, from image to image |
+//! | [`map`] | tags whose poses to each other are unknown, from many images |
 //! | [`lie`] | exponential and logarithm of rigid motions |
 //! | [`mod@print`] | tags on paper: PDF, SVG, PNG |
 
@@ -28,6 +29,7 @@ pub mod filter;
 pub mod history;
 pub mod lie;
 pub mod luma;
+pub mod map;
 pub mod planar;
 pub mod pose;
 pub mod print;

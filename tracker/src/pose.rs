@@ -15,7 +15,7 @@
 //! | `report` | what is said about a pose |
 
 pub(crate) mod chi_squared;
-mod consensus;
+pub(crate) mod consensus;
 mod decision;
 pub(crate) mod least_squares;
 pub(crate) mod mirror;

@@ -6,6 +6,7 @@ pub mod compare;
 pub mod doctor;
 pub mod export;
 pub mod info;
+pub mod map;
 pub mod print;
 pub mod record;
 pub mod reference;

@@ -96,7 +96,11 @@ impl Input {
     }
 }
 
-fn open(uri: &str, live: bool) -> anyhow::Result<Source> {
+/// Opens a source that shows colours or brightness.
+///
+/// # Errors
+/// Of the source; a depth camera.
+pub fn open(uri: &str, live: bool) -> anyhow::Result<Source> {
     let registry = sources::registry();
     let uri = if live { uri.to_owned() } else { at_full_speed(uri.parse()?).to_string() };
     let camera = registry.open(&uri)?;
@@ -123,7 +127,7 @@ fn at_full_speed(mut uri: SourceUri) -> SourceUri {
 }
 
 /// The calibration file for a camera, else the one that it brings along.
-fn lens(camera: &dyn Camera, file: Option<&Path>, how: &str) -> anyhow::Result<Calibration> {
+pub fn lens(camera: &dyn Camera, file: Option<&Path>, how: &str) -> anyhow::Result<Calibration> {
     match (file, camera.calibration()) {
         (Some(file), _) => sources::calibration_for(camera, file),
         (None, Some(own)) => Ok(own.clone()),

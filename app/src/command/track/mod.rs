@@ -1,10 +1,10 @@
 //! `coshade track`: where tags and bodies are in the frames of a camera.
 
 mod bodies;
-mod input;
+pub mod input;
 mod measured;
 mod output;
-mod rows;
+pub mod rows;
 mod summary;
 
 use std::path::PathBuf;
@@ -234,7 +234,7 @@ fn status(camera: CameraState) -> &'static str {
     }
 }
 
-fn tag(text: &str) -> Result<(TagId, f64), String> {
+pub fn tag(text: &str) -> Result<(TagId, f64), String> {
     let parts: Vec<&str> = text.split(':').collect();
     let &[name, id, size_m] = parts.as_slice() else {
         return Err("family, number and size in metres, such as tag36h11:7:0.05".to_owned());
@@ -249,11 +249,11 @@ fn tag(text: &str) -> Result<(TagId, f64), String> {
     }
 }
 
-fn family(name: &str) -> Result<Family, String> {
+pub fn family(name: &str) -> Result<Family, String> {
     name.parse().map_err(|error: coshade_tracker::family::UnknownFamily| error.to_string())
 }
 
-fn decimation(text: &str) -> Result<f32, String> {
+pub fn decimation(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(factor) if (1.0..=16.0).contains(&factor) => Ok(factor),
         _ => Err("a factor from 1 to 16".to_owned()),
