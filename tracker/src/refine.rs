@@ -113,8 +113,6 @@ struct Stage {
     /// Deviations that are tolerated in the first step, as a fraction of the contrast. Corners that are a cell off deviate
     /// by much.
     tolerated: f64,
-    /// Whether the shape of the blur is only about right.
-    fast: bool,
 }
 
 /// A pixel to be explained.
@@ -187,9 +185,8 @@ impl Refiner {
             max_iterations,
             converged_px: 0.1,
             tolerated: 0.24,
-            fast: true,
         };
-        let fine = Stage { max_pixels, converged_px: 0.02, tolerated: TOLERATED, fast: false, ..coarse };
+        let fine = Stage { max_pixels, converged_px: 0.02, tolerated: TOLERATED, ..coarse };
         self.run(image, tag, corners_px, &[coarse, fine])
     }
 
@@ -206,7 +203,7 @@ impl Refiner {
         max_pixels: usize,
     ) -> Result<Refined, RefineError> {
         let max_iterations = self.settings.max_iterations;
-        let near = Stage { max_pixels, max_iterations, converged_px: 0.04, tolerated: 0.06, fast: false };
+        let near = Stage { max_pixels, max_iterations, converged_px: 0.04, tolerated: 0.06 };
         self.run(image, tag, corners_px, &[near])
     }
 

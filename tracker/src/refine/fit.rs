@@ -42,8 +42,6 @@ pub(super) struct Fit<'a> {
     noise: Option<f64>,
     /// Deviations from which on a pixel shows something else than the tag.
     scale: f64,
-    /// Whether the blur's correlation is left out.
-    fast: bool,
     iterations: u32,
 }
 
@@ -104,7 +102,6 @@ impl<'a> Fit<'a> {
             light: SVector::zeros(),
             noise: None,
             scale: f64::INFINITY,
-            fast: true,
             iterations: 0,
         })
     }
@@ -158,7 +155,6 @@ impl<'a> Fit<'a> {
         scratch: &mut Scratch,
     ) -> Result<Sums, RefineError> {
         let mut tolerated = stage.tolerated;
-        self.fast = stage.fast;
         if self.noise.is_none() {
             self.start_light(samples).ok_or(RefineError::Flat)?;
             self.scale = tolerated * self.light[3];
@@ -224,8 +220,7 @@ impl<'a> Fit<'a> {
         let (mut n, mut t, mut tt, mut l, mut tl) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for sample in samples {
             let (cell, by_place) = self.cell(&sample.place)?;
-            let value =
-                self.template.shade(cell, &self.covariance(&(by_place * sample.by_px)), self.fast).value;
+            let value = self.template.shade(cell, &self.covariance(&(by_place * sample.by_px))).value;
             n += 1.0;
             t += value;
             tt += value * value;
@@ -254,7 +249,7 @@ impl<'a> Fit<'a> {
         let middle = 0.5 * self.template.side();
         for sample in samples {
             let Some((cell, by_place)) = self.cell(&sample.place) else { continue };
-            let shade = self.template.shade(cell, &self.covariance(&(by_place * sample.by_px)), self.fast);
+            let shade = self.template.shade(cell, &self.covariance(&(by_place * sample.by_px)));
             let (u, v, t) = ((cell.x - middle) / middle, (cell.y - middle) / middle, shade.value);
             let light = [1.0, u, v, t, u * t, v * t, t * (1.0 - t)];
             let predicted: f64 = self.light.iter().zip(light).map(|(unknown, factor)| unknown * factor).sum();
