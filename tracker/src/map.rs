@@ -185,6 +185,15 @@ pub enum MapError {
         /// The tag.
         tag: TagId,
     },
+    /// A tag fits nowhere.
+    #[error(
+        "no view of {tag} fits the others; the calibration may not belong to the images (try to refine the lens), its size may be \
+         another, or it has moved"
+    )]
+    NoFit {
+        /// The tag.
+        tag: TagId,
+    },
     /// What is seen does not determine the map.
     #[error("the views do not determine the poses of all tags{}", if *.refine_lens { " and the lens: map without refining the lens" } else { "" })]
     Undetermined {

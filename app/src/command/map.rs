@@ -138,8 +138,11 @@ fn settings(args: &Args) -> anyhow::Result<MapSettings> {
              do: all lengths grow with it"
         );
     }
-    if let Some((index, (tag, _))) =
-        args.tag.iter().enumerate().find(|(index, (tag, _))| args.tag.iter().skip(index + 1).any(|(other, _)| other == tag))
+    if let Some((index, (tag, _))) = args
+        .tag
+        .iter()
+        .enumerate()
+        .find(|(index, (tag, _))| args.tag.iter().skip(index + 1).any(|(other, _)| other == tag))
     {
         bail!("--tag {tag}: is given twice (first as number {})", index + 1);
     }
@@ -162,12 +165,14 @@ fn origin(text: &str, args: &Args) -> anyhow::Result<TagId> {
         },
     };
     let id = id.parse().ok().filter(|id| *id < family.tag_count());
-    let id = id.ok_or_else(|| anyhow!("--origin {text}: {family} has tags from 0 to {}", family.tag_count() - 1))?;
+    let id =
+        id.ok_or_else(|| anyhow!("--origin {text}: {family} has tags from 0 to {}", family.tag_count() - 1))?;
     Ok(TagId { family, id })
 }
 
 fn families(args: &Args, settings: &MapSettings) -> Vec<Family> {
-    let named = settings.sizes_m.iter().map(|(tag, _)| tag.family).chain(settings.origin.map(|tag| tag.family));
+    let named =
+        settings.sizes_m.iter().map(|(tag, _)| tag.family).chain(settings.origin.map(|tag| tag.family));
     let mut families: Vec<Family> = named.chain(args.family.iter().copied()).collect();
     if families.is_empty() {
         families.push(Family::Tag36h11);

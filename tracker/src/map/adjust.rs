@@ -8,7 +8,7 @@ use super::{Job, MapError};
 use crate::body::BodyTag;
 use crate::detection::TagObservation;
 use crate::planar::planar_poses;
-use crate::pose::chi_squared::{MEDIAN_OF_8, ONE_IN_1E6, limit};
+use crate::pose::chi_squared::{MEDIAN_OF_8, ONE_IN_1E4, ONE_IN_1E6, limit};
 use crate::pose::consensus::robust_score;
 use crate::pose::least_squares::{Search, minimise as minimise_pose};
 use crate::pose::residuals::{Imaging, Target};
@@ -25,8 +25,6 @@ const SETTLED: f64 = 1e-3;
 const SELECTIONS: usize = 6;
 /// χ² of one observation at which its weight is a quarter: twice what is expected.
 const KERNEL: f64 = 2.0 * MEDIAN_OF_8;
-/// A camera whose tags fit so well, by their logarithmic score each, is where it should be: χ² of 25 each.
-const GOOD_SCORE: f64 = 1.0;
 /// Round from which on the lens is estimated too.
 const LENS_FROM: usize = 5;
 /// Steps between two rounds.
@@ -109,6 +107,13 @@ pub(super) fn adjust(mut problem: Problem, job: &Job<'_>) -> Result<Adjusted, Ma
 
 fn finish(problem: Problem, weights: Vec<f64>, unexplained_px: f64) -> Result<Adjusted, MapError> {
     let undetermined = MapError::Undetermined { refine_lens: problem.free_lens };
+    let is_used = |tag: usize| {
+        let mut used = problem.observations.iter().zip(&weights).filter(|(_, weight)| **weight > 0.0);
+        used.any(|(observation, _)| observation.tag == tag)
+    };
+    if let Some((_, tag)) = problem.tags.iter().enumerate().find(|(index, _)| !is_used(*index)) {
+        return Err(MapError::NoFit { tag: tag.tag });
+    }
     let system = System::new(&problem, &weights).ok_or(undetermined.clone())?;
     let covariance = system.covariance().ok_or(undetermined)?;
     let reduced_chi2 = system.chi2 / freedom(&problem, &weights).max(1.0);
@@ -128,7 +133,8 @@ fn relocate(problem: &mut Problem, unexplained_px: f64) {
         let imaging = Imaging { lens: &problem.lens, motion: None };
         let score = |pose: &Isometry3<f64>| robust_score(&imaging, &targets, pose);
         let here = score(&camera.camera_from_map);
-        if here <= GOOD_SCORE * targets.len() as f64 {
+        let view = imaging.at(&camera.camera_from_map);
+        if targets.iter().all(|target| view.square(target) <= limit(8.0, ONE_IN_1E4)) {
             continue;
         }
         let starts = seen.iter().filter_map(|(seen, tag)| {

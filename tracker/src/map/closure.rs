@@ -4,10 +4,11 @@
 //! chain that leads from one neighbour to the other all the way round; the views that were taken out say directly how the
 //! two lie to each other. No image is used for both.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use coshade_lens::model::CameraModel;
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector2};
 
 use super::graph::Graph;
 use super::grow::grow;
@@ -90,24 +91,35 @@ pub(super) fn measure(
     }))
 }
 
-/// For each tag, which of the loop's it is nearest to.
-fn places(graph: &Graph, cycle: &[TagId]) -> BTreeMap<TagId, usize> {
-    let mut nearest: BTreeMap<TagId, (usize, usize)> = BTreeMap::new();
+/// For each tag, where along the loop it is: the mean of those of the loop that it is nearest to, the first of which is at 0.
+fn places(graph: &Graph, cycle: &[TagId]) -> BTreeMap<TagId, f64> {
+    let turn = std::f64::consts::TAU / cycle.len() as f64;
+    let mut nearest: BTreeMap<TagId, (usize, Vector2<f64>)> = BTreeMap::new();
     for (place, tag) in cycle.iter().enumerate() {
+        let angle = turn * place as f64;
+        let here = Vector2::new(angle.cos(), angle.sin());
         for (other, steps) in graph.distances(*tag) {
-            let entry = nearest.entry(other).or_insert((steps, place));
-            *entry = (*entry).min((steps, place));
+            let entry = nearest.entry(other).or_insert((steps, Vector2::zeros()));
+            match steps.cmp(&entry.0) {
+                Ordering::Less => *entry = (steps, here),
+                Ordering::Equal => entry.1 += here,
+                Ordering::Greater => {}
+            }
         }
     }
-    nearest.into_iter().map(|(tag, (_, place))| (tag, place)).collect()
+    let place = |(tag, (_, sum)): (TagId, (usize, Vector2<f64>))| {
+        let place = sum.y.atan2(sum.x) / turn;
+        // The cut is half a step before the first.
+        (tag, if place < -0.5 { place + cycle.len() as f64 } else { place })
+    };
+    nearest.into_iter().map(place).collect()
 }
 
 /// Whether two of its tags are nearer to each other through the cut than along the loop.
-fn is_across(view: &View, places: &BTreeMap<TagId, usize>, length: usize) -> bool {
-    let places: Vec<usize> =
-        view.observations.iter().filter_map(|seen| places.get(&seen.tag).copied()).collect();
-    let (low, high) = (places.iter().min(), places.iter().max());
-    low.zip(high).is_some_and(|(low, high)| 2 * (high - low) > length)
+fn is_across(view: &View, places: &BTreeMap<TagId, f64>, length: usize) -> bool {
+    let places = || view.observations.iter().filter_map(|seen| places.get(&seen.tag).copied());
+    let (low, high) = (places().fold(f64::MAX, f64::min), places().fold(f64::MIN, f64::max));
+    2.0 * (high - low) > length as f64
 }
 
 struct Chain {

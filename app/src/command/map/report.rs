@@ -186,10 +186,17 @@ impl Summary {
             let shown = self.lens.params.iter().map(|(name, value)| {
                 format!("{name} {value:.4} ± {:.4}", std.get(name).copied().unwrap_or_default())
             });
-            let _ = writeln!(out, "  lens estimated ({}): {}", self.lens.model, shown.collect::<Vec<_>>().join(", "));
+            let _ = writeln!(
+                out,
+                "  lens estimated ({}): {}",
+                self.lens.model,
+                shown.collect::<Vec<_>>().join(", ")
+            );
         }
         for rejected in &self.rejected {
-            let by = rejected.rms_px.map_or("outside the field of view".to_owned(), |rms| format!("off by {rms:.2} px"));
+            let by = rejected
+                .rms_px
+                .map_or("outside the field of view".to_owned(), |rms| format!("off by {rms:.2} px"));
             let _ = writeln!(out, "  left out: {} in image {}, {by}", rejected.tag, rejected.image);
         }
         match &self.closure {
@@ -220,7 +227,8 @@ impl TagRow {
 
 impl ClosureRow {
     fn text(&self) -> String {
-        let ends = |error: &ErrorRow| format!("{:.2} mm, {:.3} deg", error.translation_mm, error.rotation_deg);
+        let ends =
+            |error: &ErrorRow| format!("{:.2} mm, {:.3} deg", error.translation_mm, error.rotation_deg);
         format!(
             "  loop of {} tags, {:.3} m long, cut between {} and {} ({} images across, {} around): fails to close by {}; before \
              adjustment by {}\n",
@@ -238,8 +246,7 @@ impl ClosureRow {
 
 fn view_rows(sights: &Sights, map: &TagMap) -> Vec<ViewRow> {
     let row = |view: &coshade_tracker::map::View| {
-        let mapped =
-            map.views.iter().find(|mapped| mapped.number == view.number && !mapped.tags.is_empty());
+        let mapped = map.views.iter().find(|mapped| mapped.number == view.number && !mapped.tags.is_empty());
         let seen: Vec<TagId> = view.observations.iter().map(|seen| seen.tag).collect();
         ViewRow {
             image: view.number,
