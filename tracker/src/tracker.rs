@@ -96,11 +96,11 @@ pub struct Tracker {
 
 /// How long a tag that is out of sight is looked for where its way would lead, and how long it is missed.
 const FOLLOWED: Duration = Duration::from_millis(500);
-const MISSED: Duration = Duration::from_secs(2);
+const MISSED: Duration = Duration::from_secs(5);
 /// A tag that was seen so shortly ago was in the last frame or the one before.
 const LAST_FRAME: Duration = Duration::from_millis(120);
-/// Searches for tags that are missing, and for new ones, are made in images so many times smaller.
-const DECIMATE_FOR_MISSING: u32 = 2;
+/// Searches for tags that are lost, and for new ones, are made in images so many times smaller.
+const DECIMATE_FOR_LOST: u32 = 2;
 const DECIMATE_FOR_NEW: u32 = 4;
 
 impl Tracking {
@@ -193,20 +193,22 @@ impl Tracker {
 
     /// Whether the whole image is to be searched now, and how many times smaller.
     fn due(&mut self, image: &Luma, captured: Timestamp, tracking: &Tracking) -> Option<u32> {
-        let elapsed = |last: Option<Timestamp>| last.map(|last| captured.saturating_since(last));
-        let TrackerSettings { regions, search_every, search_thoroughly_every, .. } = self.settings;
-        let all_lost =
-            tracking.tags.is_empty() && self.trails.iter().any(|trail| trail.was_in(captured, LAST_FRAME));
-        if regions && !all_lost && elapsed(self.last_search).is_some_and(|elapsed| elapsed < search_every) {
-            return None;
-        }
-        let is_missing = |trail: &Trail| !tracking.has(trail.tag()) && trail.should_be_in(image, captured);
-        if !regions || elapsed(self.last_thorough).is_none_or(|elapsed| elapsed >= search_thoroughly_every) {
+        let settings = &self.settings;
+        let is_over =
+            |last: Option<Timestamp>, every| last.is_none_or(|last| captured.saturating_since(last) >= every);
+        if !settings.regions || is_over(self.last_thorough, settings.search_thoroughly_every) {
             self.last_thorough = Some(captured);
             return Some(1);
         }
-        let missing = tracking.tags.is_empty() || self.trails.iter().any(is_missing);
-        Some(if missing { DECIMATE_FOR_MISSING } else { DECIMATE_FOR_NEW })
+        let nothing = tracking.tags.is_empty();
+        let all_at_once = nothing && self.trails.iter().any(|trail| trail.was_in(captured, LAST_FRAME));
+        let is_missing = |trail: &Trail| !tracking.has(trail.tag()) && trail.should_be_in(image, captured);
+        let missing = nothing || self.trails.iter().any(is_missing);
+        let (every, decimate) = match missing {
+            true => (settings.search_for_lost_every, DECIMATE_FOR_LOST),
+            false => (settings.search_for_new_every, DECIMATE_FOR_NEW),
+        };
+        (all_at_once || is_over(self.last_search, every)).then_some(decimate)
     }
 
     /// Where tags were, for the next image.

@@ -153,7 +153,8 @@ fn between_searches_tags_are_followed_as_exactly() {
     let calibration = calibration();
     let settings = TrackerSettings {
         filter: false,
-        search_every: Duration::from_secs(3600),
+        search_for_lost_every: Duration::from_secs(3600),
+        search_for_new_every: Duration::from_secs(3600),
         ..TrackerSettings::default()
     };
     let mut tracker = Tracker::new(&calibration, &[pair()], settings).unwrap();
