@@ -106,7 +106,7 @@ fn report(
         let regions: Vec<Region> = found.iter().map(|tag| around(tag, side)).collect();
         let (hits, cpu_ms) = fastest(options.repeat, || {
             regions.iter().zip(&found).try_fold(0, |hits, (region, tag)| {
-                let again = detector.find_in(&luma, *region)?;
+                let again = detector.find_in(&luma, *region, 1)?;
                 Ok::<_, Box<dyn Error>>(hits + usize::from(again.iter().any(|other| other.tag == tag.tag)))
             })
         })?;

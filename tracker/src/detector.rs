@@ -33,15 +33,20 @@ pub trait FindTags: Send {
     /// As [`find`](Self::find).
     fn find_coarsely(&mut self, image: &Luma, decimate: u32) -> Result<Vec<Detection>, DetectorError>;
 
-    /// Tags within a part of the image, in coordinates of the whole image. Where the part reaches beyond the image, it is
-    /// cut.
+    /// Tags within a part of the image, made `decimate` times smaller, in coordinates of the whole image. Where the part reaches
+    /// beyond the image, it is cut.
     ///
     /// # Errors
     /// As [`find`](Self::find).
-    fn find_in(&mut self, image: &Luma, region: Region) -> Result<Vec<Detection>, DetectorError> {
+    fn find_in(
+        &mut self,
+        image: &Luma,
+        region: Region,
+        decimate: u32,
+    ) -> Result<Vec<Detection>, DetectorError> {
         let Region { x_px, y_px, width_px, height_px } = region;
         let Some(part) = image.crop(x_px, y_px, width_px, height_px) else { return Ok(Vec::new()) };
-        let mut found = self.find(&part)?;
+        let mut found = self.find_coarsely(&part, decimate)?;
         let shift = Vector2::new(f64::from(x_px), f64::from(y_px));
         found.iter_mut().flat_map(|detection| &mut detection.corners_px).for_each(|corner| *corner += shift);
         Ok(found)

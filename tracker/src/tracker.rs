@@ -162,7 +162,9 @@ impl Tracker {
         let mut sight =
             Sight::new(image, &self.lens, self.detector.as_mut(), &mut self.refiner, &self.bodies);
         if self.settings.regions {
-            let trails = self.trails.iter().filter(|trail| trail.was_in(captured, FOLLOWED));
+            let here =
+                |trail: &&Trail| trail.was_in(captured, FOLLOWED) && trail.should_be_in(image, captured);
+            let trails = self.trails.iter().filter(here);
             let alone: Vec<Expectation> = trails.map(|trail| trail.expect(captured)).collect();
             sight.follow(captured, &alone, self.settings.follow_pixels);
         }

@@ -23,6 +23,8 @@ const MIN_FOLLOW_PIXELS: usize = 250;
 const COMPLETING_PIXELS: usize = 1500;
 /// Parts of the image that are searched for lost tags, at most so many in an image: bounds the time.
 const MAX_REGIONS: usize = 8;
+/// Tags of this side are found in any image, larger ones in one that is so many times smaller.
+const EASY_SIDE_PX: f64 = 40.0;
 /// Around the place where a tag should be, in sides of it, and in px at least.
 const REGION_SIDES: f64 = 0.75;
 const REGION_PX: f64 = 24.0;
@@ -145,7 +147,8 @@ impl<'a> Sight<'a> {
             }
             let Some(region) = region_around(self.image, &corners_px) else { continue };
             self.regions -= 1;
-            for detection in self.detector.find_in(self.image, region).unwrap_or_default() {
+            let decimate = (side_px(&corners_px) / EASY_SIDE_PX) as u32;
+            for detection in self.detector.find_in(self.image, region, decimate).unwrap_or_default() {
                 self.take(&detection);
             }
             found += usize::from(self.tracking.has(tag));

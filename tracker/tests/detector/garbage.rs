@@ -110,11 +110,11 @@ fn regions_reach_beyond_the_image() {
         Region { x_px: 0, y_px: 0, width_px: u32::MAX, height_px: u32::MAX },
         Region { x_px: 0, y_px: 0, width_px: 640, height_px: 480 },
     ] {
-        assert_eq!(detector.find_in(&picture.luma(), region).unwrap().len(), 3);
+        assert_eq!(detector.find_in(&picture.luma(), region, 1).unwrap().len(), 3);
     }
     for (x_px, y_px) in [(639, 479), (640, 480), (u32::MAX, u32::MAX)] {
         let region = Region { x_px, y_px, width_px: u32::MAX, height_px: 0 };
-        assert_eq!(detector.find_in(&picture.luma(), region).unwrap(), []);
+        assert_eq!(detector.find_in(&picture.luma(), region, 1).unwrap(), []);
     }
 }
 

@@ -153,7 +153,7 @@ fn parts_of_an_image_give_the_coordinates_of_the_whole() {
         let center = tag.corners_px.iter().sum::<Vector2<f64>>() / 4.0;
         let (x_px, y_px) = (center.x as u32 - 75, center.y as u32 - 75);
         let part = Region { x_px, y_px, width_px: 150, height_px: 150 };
-        let found = detector.find_in(&picture.luma(), part).unwrap();
+        let found = detector.find_in(&picture.luma(), part, 1).unwrap();
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].tag, tag.tag);
         // The threshold's tiles of four pixels begin elsewhere; the refined edges are the same.
@@ -161,7 +161,7 @@ fn parts_of_an_image_give_the_coordinates_of_the_whole() {
         assert!(distances.fold(0.0, f64::max) < 0.1);
     }
     let outside = Region { x_px: 640, y_px: 0, width_px: 10, height_px: 10 };
-    assert_eq!(detector.find_in(&picture.luma(), outside).unwrap(), []);
+    assert_eq!(detector.find_in(&picture.luma(), outside, 1).unwrap(), []);
 }
 
 #[test]
@@ -187,7 +187,7 @@ fn tags_of_low_contrast_are_found_in_parts_of_an_image() {
     let picture = picture(&lens(), SIZE_PX, &placed, &look);
     let mut detector = Detector::new(&DetectorSettings::default()).unwrap();
     let part = Region { x_px: 280, y_px: 200, width_px: 80, height_px: 80 };
-    assert!(worst_px(&detector.find_in(&picture.luma(), part).unwrap(), &placed) < 1.0);
+    assert!(worst_px(&detector.find_in(&picture.luma(), part, 1).unwrap(), &placed) < 1.0);
 }
 
 #[test]
