@@ -1,5 +1,7 @@
 //! Maps of tags whose true poses are known.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests: a panic is a failed test")]
+
 use coshade_lens::model::{CameraModel, ModelKind};
 use coshade_tracker::map::{MapError, MapSettings, TagMap, View, map_tags};
 use coshade_tracker::{Family, TagId, TagObservation, UNIT_CORNERS, lie};
