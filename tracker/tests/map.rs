@@ -110,7 +110,7 @@ fn chi2(map: &TagMap) -> (f64, f64) {
     let of = |tag: &coshade_tracker::map::MappedTag| {
         let truth = map_from_room * room_from_tag(tag.tag.id);
         let error = lie::log(&(tag.map_from_tag * truth.inverse()));
-        let covariance = tag.covariance.cholesky().expect("covariances are positive definite");
+        let covariance = tag.covariance.cholesky().unwrap();
         error.dot(&covariance.solve(&error))
     };
     let all: Vec<f64> = map.tags.iter().filter(|tag| tag.tag != map.origin).map(of).collect();

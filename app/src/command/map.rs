@@ -46,7 +46,7 @@ pub struct Args {
     /// A tag of known size, such as tag36h11:7:0.05 (repeat for more). Without --size-m the first one's is that of all
     #[arg(long, value_name = "FAMILY:ID:SIZE_M", value_parser = tag)]
     tag: Vec<(TagId, f64)>,
-    /// Estimate the sizes of all tags not named by --tag, starting from --size-m, which may be off by a third or so
+    /// Estimate the sizes of all tags not named by --tag, starting from --size-m, which may be off by a tenth or so
     #[arg(long)]
     free_sizes: bool,
     /// The tag whose frame is the map's, such as 7 or tagStandard41h12:7 [default: the lowest of the largest group]

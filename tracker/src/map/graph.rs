@@ -5,6 +5,9 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use super::{MapError, View};
 use crate::detection::TagId;
 
+/// Loops that are looked at, at most: seconds.
+const MOST_LOOPS: usize = 20_000_000;
+
 /// Tags as nodes; an edge for each pair that some view shows.
 pub(super) struct Graph {
     neighbours: BTreeMap<TagId, BTreeSet<TagId>>,
@@ -77,12 +80,17 @@ impl Graph {
         distances
     }
 
-    /// The longest loop among `group` that has no short cut: on it no two tags are nearer to each other than along it.
+    /// The longest loop among `group` that has no short cut: on it no two tags are nearer to each other than along it. Empty if
+    /// there is none, or so many that looking at all would take minutes.
     pub fn longest_loop(&self, group: &[TagId]) -> Vec<TagId> {
         let distances: BTreeMap<TagId, BTreeMap<TagId, usize>> =
             group.iter().map(|tag| (*tag, self.distances(*tag))).collect();
         let steps = |a: TagId, b: TagId| distances.get(&a).and_then(|of| of.get(&b)).copied();
         let mut longest: Vec<TagId> = Vec::new();
+        let pairs: usize = group.iter().map(|tag| self.neighbours(*tag).count()).sum();
+        if pairs.saturating_mul(group.len()) > MOST_LOOPS {
+            return longest;
+        }
         for &root in group {
             for &a in group {
                 for b in self.neighbours(a).filter(|b| *b > a) {
@@ -91,7 +99,7 @@ impl Graph {
                         continue;
                     }
                     let cycle = self.cycle(root, a, b, &distances);
-                    if cycle.len() > longest.len() && is_without_short_cut(&cycle, &steps) {
+                    if cycle.len() > longest.len().max(2) && is_without_short_cut(&cycle, &steps) {
                         longest = cycle;
                     }
                 }
