@@ -1,7 +1,5 @@
 //! Tracked poses against the truth of the recorded desk.
 
-#![expect(clippy::unwrap_used, reason = "clippy knows only functions marked as tests as tests")]
-
 use coshade_tests::tracking::{BodyTruth, desk};
 use coshade_tracker::TrackerSettings;
 
@@ -10,7 +8,6 @@ use coshade_tracker::TrackerSettings;
 fn check(bodies: &[BodyTruth], overlay_px: [[f64; 2]; 4]) {
     for (body, bar_px) in bodies.iter().zip(overlay_px) {
         let figures = body.figures();
-        println!("{}: {figures:?}", body.name);
         assert_eq!(body.frames.len(), 40, "{}", body.name);
         assert_eq!((body.flips(), body.ambiguous()), (0, 0), "{}", body.name);
         let [median, most] = figures.overlay_px;

@@ -4,6 +4,8 @@
 
 mod common;
 
+use std::f64::consts::TAU;
+
 use common::{Look, PlacedTag, Random, picture};
 use coshade_capture::Timestamp;
 use coshade_lens::calibration::Calibration;
@@ -51,13 +53,13 @@ fn lenses() -> Vec<Lens> {
 
 /// Facing the camera from some direction, tilted by up to 50°.
 fn placed(random: &mut Random, off_axis_deg: f64) -> PlacedTag {
-    let (off_axis, azimuth) = (random.within(0.0, off_axis_deg).to_radians(), random.within(0.0, 6.28));
+    let (off_axis, azimuth) = (random.within(0.0, off_axis_deg).to_radians(), random.within(0.0, TAU));
     let away = Vector3::new(off_axis.sin() * azimuth.cos(), off_axis.sin() * azimuth.sin(), off_axis.cos());
     let facing = UnitQuaternion::rotation_between(&-Vector3::z(), &away)
         .unwrap_or(UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
     let across = facing * Vector3::new(azimuth.sin(), azimuth.cos(), 0.0);
     let tilt = UnitQuaternion::from_axis_angle(&Unit::new_normalize(across), random.within(0.0, 0.87));
-    let roll = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), random.within(0.0, 6.28));
+    let roll = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), random.within(0.0, TAU));
     let camera_from_tag =
         Isometry3::from_parts(Translation3::from(away * random.within(0.25, 0.4)), tilt * facing * roll);
     PlacedTag { tag: TAG, size_m: SIZE_M, camera_from_tag }

@@ -1,6 +1,10 @@
 //! Refined corners against the truth.
 
+#![expect(clippy::unwrap_used, reason = "clippy knows only functions marked as tests as tests")]
+
 mod common;
+
+use std::f64::consts::TAU;
 
 use common::{Look, Picture, PlacedTag, Random, picture};
 use coshade_lens::model::{CameraModel, ModelKind};
@@ -32,10 +36,10 @@ fn placed(random: &mut Random, direction: Vector3<f64>, distance_m: f64, max_til
         .unwrap_or(UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
     let side = Vector3::x() - away * away.x;
     let azimuth =
-        UnitQuaternion::from_axis_angle(&nalgebra::Unit::new_normalize(away), random.within(0.0, 6.28));
+        UnitQuaternion::from_axis_angle(&nalgebra::Unit::new_normalize(away), random.within(0.0, TAU));
     let axis = nalgebra::Unit::new_normalize(azimuth * side);
     let tilt = UnitQuaternion::from_axis_angle(&axis, random.within(0.0, max_tilt_deg).to_radians());
-    let roll = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), random.within(0.0, 6.28));
+    let roll = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), random.within(0.0, TAU));
     let camera_from_tag = Isometry3::from_parts(Translation3::from(away * distance_m), tilt * facing * roll);
     PlacedTag { tag: TAG, size_m: SIZE_M, camera_from_tag }
 }
@@ -104,7 +108,7 @@ fn corners_and_their_covariance_are_right_in_a_pinhole() {
 #[test]
 fn corners_and_their_covariance_are_right_in_a_fish_eye_to_80_degrees() {
     let direction = |random: &mut Random| {
-        let (off_axis, azimuth) = (random.within(0.0, 80.0).to_radians(), random.within(0.0, 6.28));
+        let (off_axis, azimuth) = (random.within(0.0, 80.0).to_radians(), random.within(0.0, TAU));
         Vector3::new(off_axis.sin() * azimuth.cos(), off_axis.sin() * azimuth.sin(), off_axis.cos())
     };
     check_accuracy(&fisheye(), direction, 0.12);

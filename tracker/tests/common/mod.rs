@@ -1,5 +1,6 @@
 //! Pictures of tags whose truth is known: every pixel is the mean of rays through the lens onto the printed cells.
 #![allow(dead_code, reason = "each test uses a part")]
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "helpers of tests may panic")]
 
 use coshade_lens::model::CameraModel;
 use coshade_tracker::{Luma, TagBitmap, TagId, UNIT_CORNERS, tag_bitmap};
