@@ -1,6 +1,10 @@
 //! Refined corners against the truth.
 
-#![expect(clippy::unwrap_used, reason = "clippy knows only functions marked as tests as tests")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "clippy knows only functions marked as tests as tests"
+)]
 
 mod common;
 
