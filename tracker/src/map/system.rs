@@ -227,7 +227,7 @@ mod tests {
             let camera = problem.cameras.len();
             problem.cameras.push(Camera { number: number.into(), camera_from_map });
             for tag in problem.tags.clone() {
-                let mut covariance_px2 = nalgebra::SMatrix::identity() * 0.04;
+                let mut covariance_px2 = SMatrix::identity() * 0.04;
                 (covariance_px2[(0, 1)], covariance_px2[(1, 0)]) = (0.02, 0.02);
                 let seen = TagObservation { tag: tag.tag, corners_px: Default::default(), covariance_px2 };
                 let mut own = Observation::new(camera, &problem.tags, &seen).unwrap();
