@@ -31,8 +31,9 @@ const METRES_PER_PX: f64 = TAG_M / TAG_PX;
 const STEP_PX: u32 = 3;
 const FRAMES: u32 = 8;
 
-/// How well corners can be found at least: edges lie between two pixels, without blur, which is the hardest case for
-/// methods that expect some.
+/// Every camera blurs: without, an edge between two pixels could be anywhere in between.
+const BLUR_PX: f32 = 0.6;
+/// How well corners can be found at least.
 const CORNER_PX: f64 = 0.1;
 
 /// Middle of the board in a frame, in camera coordinates.
@@ -66,6 +67,7 @@ fn desk(folder: &Path) {
     for frame in 0..FRAMES {
         let mut picture = image::GrayImage::from_pixel(SIZE_PX[0], SIZE_PX[1], Luma([225]));
         (0..4).for_each(|tag| paste_tag(&mut picture, tag, tag_center_px(frame, tag)));
+        let picture = image::imageops::blur(&picture, BLUR_PX);
         picture.save(folder.join(format!("photos/{frame:04}.png"))).unwrap();
     }
     let offset_m = f64::from(PITCH_PX) / 2.0 * METRES_PER_PX;

@@ -6,10 +6,13 @@
 //! | `--decimate N`, `--threads N`, `--blur PX`, `--refine-edges BOOL`, `--sharpening X`, `--max-hamming N`, `--min-cluster N`, `--min-contrast N` | as in `DetectorSettings` |
 //! | `--repeat N` | the fastest of so many searches counts; 1 |
 //! | `--region SIDE` | also searches a square of this side around each tag |
-//! | `--refine` | corners as refined, without a lens |
+//! | `--refine` | corners as refined; without `--camera`, as if there were no lens |
+//! | `--camera FX,FY,CX,CY` | a pinhole |
+//! | `--size-m X` | size of the tags: with `--camera` also both poses of each |
 //!
 //! The answer is a list with an object per image: `file`, `width_px`, `height_px`, `cpu_ms` of the search alone (of all threads;
-//! null where the system does not tell), `refine_cpu_ms`, `tags` (`family`, `id`, `corners_px`, `hamming`, `margin`), and with
+//! null where the system does not tell), `refine_cpu_ms`, `pose_cpu_ms`, `tags` (`family`, `id`, `corners_px`, `hamming`,
+//! `margin`, `explained` if it could be refined, `camera_from_tag`: both matrices of 3 × 4 numbers, the better first), and with
 //! `--region` `region_cpu_ms` per region and `regions_found`.
 
 use std::error::Error;
@@ -17,10 +20,12 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
+use coshade_lens::model::{CameraModel, ModelKind};
 use coshade_lens::response::Response;
 use coshade_tracker::detector::{Detector, DetectorSettings, FindTags, Region};
 use coshade_tracker::refine::{RefineSettings, Refiner};
-use coshade_tracker::{Detection, Luma};
+use coshade_tracker::{Detection, Luma, TagObservation, planar_poses};
+use nalgebra::Isometry3;
 use serde_json::{Value, json};
 
 struct Options {
@@ -28,6 +33,8 @@ struct Options {
     repeat: u32,
     region_px: Option<u32>,
     refine: bool,
+    lens: Option<CameraModel>,
+    size_m: Option<f64>,
     images: Vec<PathBuf>,
 }
 
@@ -35,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let options = Options::parse(std::env::args().skip(1))?;
     let mut detector = Detector::new(&options.settings)?;
     let mut refiner =
-        options.refine.then(|| Refiner::new(None, &Response::Linear, RefineSettings::default()));
+        options.refine.then(|| Refiner::new(options.lens, &Response::Linear, RefineSettings::default()));
     let reports = options.images.iter().map(|path| {
         report(path, &mut detector, refiner.as_mut(), &options)
             .map_err(|error| format!("{}: {error}", path.display()))
@@ -52,6 +59,8 @@ impl Options {
             repeat: 1,
             region_px: None,
             refine: false,
+            lens: None,
+            size_m: None,
             images: Vec::new(),
         };
         while let Some(name) = arguments.next() {
@@ -84,6 +93,11 @@ impl Options {
             "--min-cluster" => settings.min_cluster_pixels = value.parse()?,
             "--min-contrast" => settings.min_white_black_diff = Some(value.parse()?),
             "--repeat" => self.repeat = value.parse::<u32>()?.max(1),
+            "--camera" => {
+                let numbers: Vec<f64> = value.split(',').map(str::parse).collect::<Result<_, _>>()?;
+                self.lens = Some(CameraModel::from_params(ModelKind::Pinhole, &numbers)?);
+            }
+            "--size-m" => self.size_m = Some(value.parse()?),
             "--region" => self.region_px = Some(value.parse()?),
             _ => return Err("no such option".into()),
         }
@@ -113,23 +127,48 @@ fn report(
         report["region_cpu_ms"] = json!(cpu_ms.map(|cpu_ms| cpu_ms / regions.len() as f64));
         report["regions_found"] = json!(hits);
     }
+    let mut observations: Vec<TagObservation> =
+        found.iter().map(|tag| TagObservation::from_detection(tag, OUTLINE_ERROR_PX)).collect();
+    let mut explained = vec![None; found.len()];
     if let Some(refiner) = refiner {
         let (refined, cpu_ms) = fastest(options.repeat, || {
             let refined = found.iter().map(|tag| refiner.refine(&luma, tag.tag, &tag.corners_px).ok());
             Ok::<_, Box<dyn Error>>(refined.collect::<Vec<_>>())
         })?;
-        for (tag, refined) in found.iter_mut().zip(refined) {
+        for (index, refined) in refined.into_iter().enumerate() {
             if let Some(refined) = refined {
-                tag.corners_px = refined.observation.corners_px;
+                found[index].corners_px = refined.observation.corners_px;
+                observations[index] = refined.observation;
+                explained[index] = Some(refined.explained);
             }
         }
         report["refine_cpu_ms"] = json!(cpu_ms);
     }
-    report["tags"] = found.iter().map(tag_json).collect();
+    let mut tags: Vec<Value> = found.iter().zip(explained).map(|(tag, part)| tag_json(tag, part)).collect();
+    if let Some((lens, size_m)) = options.lens.as_ref().zip(options.size_m) {
+        let (poses, cpu_ms) = fastest(options.repeat, || {
+            let poses = observations.iter().map(|observation| planar_poses(lens, observation, size_m).ok());
+            Ok::<_, Box<dyn Error>>(poses.collect::<Vec<_>>())
+        })?;
+        for (tag, poses) in tags.iter_mut().zip(poses) {
+            tag["camera_from_tag"] =
+                json!(poses.map(|poses| poses.map(|pose| matrix(&pose.camera_from_tag))));
+        }
+        report["pose_cpu_ms"] = json!(cpu_ms);
+    }
+    report["tags"] = json!(tags);
     Ok(report)
 }
 
-fn tag_json(found: &Detection) -> Value {
+/// Standard error of corners that are not refined, in px.
+const OUTLINE_ERROR_PX: f64 = 0.3;
+
+fn matrix(pose: &Isometry3<f64>) -> [[f64; 4]; 3] {
+    let matrix = pose.to_homogeneous();
+    std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
+}
+
+fn tag_json(found: &Detection, explained: Option<f64>) -> Value {
     let corners_px = found.corners_px.map(|corner| [corner.x, corner.y]);
     json!({
         "family": found.tag.family,
@@ -137,6 +176,7 @@ fn tag_json(found: &Detection) -> Value {
         "corners_px": corners_px,
         "hamming": found.hamming,
         "margin": found.margin,
+        "explained": explained,
     })
 }
 

@@ -203,7 +203,7 @@ impl Refiner {
         max_pixels: usize,
     ) -> Result<Refined, RefineError> {
         let max_iterations = self.settings.max_iterations;
-        let near = Stage { max_pixels, max_iterations, converged_px: 0.04, tolerated: 0.06 };
+        let near = Stage { max_pixels, max_iterations, converged_px: 0.04, tolerated: 0.24 };
         self.run(image, tag, corners_px, &[near])
     }
 

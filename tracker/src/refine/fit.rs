@@ -23,6 +23,9 @@ const TUKEY: f64 = 4.685;
 /// Deviations below this fraction of the contrast are never taken for something in front of the tag.
 pub(super) const TOLERATED: f64 = 0.03;
 
+/// Corners that move by less in a step are about to settle, in px.
+const SETTLING_PX: f64 = 0.15;
+
 type Normal = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 type Unknowns = SVector<f64, UNKNOWNS>;
 /// Unknowns and deviation.
@@ -178,7 +181,10 @@ impl<'a> Fit<'a> {
             if settled || self.iterations >= stage.max_iterations {
                 break;
             }
-            tolerated = (0.5 * tolerated).max(TOLERATED);
+            // While corners still move, what deviates is not yet something else than the tag.
+            if shift < SETTLING_PX {
+                tolerated = (0.5 * tolerated).max(TOLERATED);
+            }
             self.scale =
                 (1.4826 * median(&mut scratch.deviations)).max(tolerated * self.light[3].abs()).max(0.5);
         }

@@ -17,6 +17,8 @@ use crate::refine::{RefineError, Refined, Refiner};
 const OUTLINE_ERROR_PX: f64 = 0.5;
 /// A tag that is followed must explain this much of the pixels' variance: nobody has read its bits.
 const MIN_FOLLOWED: f64 = 0.7;
+/// What explains as much is in its place.
+const SURELY_EXPLAINED: f64 = 0.93;
 /// A tag that is followed is looked at with so many pixels at least.
 const MIN_FOLLOW_PIXELS: usize = 250;
 /// The same of a tag that its body tells of after a search.
@@ -116,11 +118,16 @@ impl<'a> Sight<'a> {
             if self.tracking.has(*tag) {
                 continue;
             }
-            match self.refiner.refine_near(self.image, *tag, corners_px, self.pixels) {
-                Ok(pattern) if pattern.explained >= MIN_FOLLOWED => {
-                    self.add(pattern.observation.clone(), None, Some(pattern));
-                }
-                _ => {}
+            let Ok(mut pattern) = self.refiner.refine_near(self.image, *tag, corners_px, self.pixels) else {
+                continue;
+            };
+            if pattern.explained < SURELY_EXPLAINED {
+                // Covered in part, or not quite there yet: a careful look tells.
+                let again = self.refiner.refine(self.image, *tag, &pattern.observation.corners_px);
+                pattern = again.ok().filter(|again| again.explained > pattern.explained).unwrap_or(pattern);
+            }
+            if pattern.explained >= MIN_FOLLOWED {
+                self.add(pattern.observation.clone(), None, Some(pattern));
             }
         }
     }
