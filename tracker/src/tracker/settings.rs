@@ -36,7 +36,7 @@ impl Default for TrackerSettings {
             detector: DetectorSettings::default(),
             refine: RefineSettings::default(),
             regions: true,
-            follow_pixels: 1200,
+            follow_pixels: 1000,
             search_for_lost_every: Duration::from_millis(150),
             search_for_new_every: Duration::from_millis(500),
             search_thoroughly_every: Duration::from_secs(10),
