@@ -10,6 +10,7 @@
 
 mod body;
 mod follow;
+mod schedule;
 mod settings;
 mod sight;
 
@@ -30,6 +31,7 @@ use crate::refine::{Refined, Refiner};
 use body::BodyTracker;
 pub use body::TrackedBody;
 use follow::{Expectation, Trail};
+use schedule::Schedule;
 pub use settings::TrackerSettings;
 use sight::Sight;
 
@@ -90,18 +92,12 @@ pub struct Tracker {
     bodies: Vec<BodyTracker>,
     settings: TrackerSettings,
     trails: Vec<Trail>,
-    last_search: Option<Timestamp>,
-    last_thorough: Option<Timestamp>,
+    schedule: Schedule,
 }
 
 /// How long a tag that is out of sight is looked for where its way would lead, and how long it is missed.
 const FOLLOWED: Duration = Duration::from_millis(500);
 const MISSED: Duration = Duration::from_secs(5);
-/// A tag that was seen so shortly ago was in the last frame or the one before.
-const LAST_FRAME: Duration = Duration::from_millis(120);
-/// Searches for tags that are lost, and for new ones, are made in images so many times smaller.
-const DECIMATE_FOR_LOST: u32 = 2;
-const DECIMATE_FOR_NEW: u32 = 4;
 
 impl Tracking {
     /// All observed corners.
@@ -147,15 +143,13 @@ impl Tracker {
             bodies: bodies.iter().map(tracker).collect::<Result<_, _>>()?,
             settings,
             trails: Vec::new(),
-            last_search: None,
-            last_thorough: None,
+            schedule: Schedule::default(),
         })
     }
 
     /// What is seen in `image`, the middle row of which was exposed at `captured`.
     pub fn track(&mut self, image: &Luma, captured: Timestamp) -> Tracking {
-        // A stamp that goes back is the beginning of another sequence.
-        if self.last_search.is_some_and(|last| captured < last) {
+        if !self.schedule.goes_on(captured) {
             self.forget();
         }
         self.trails.retain(|trail| trail.was_in(captured, MISSED));
@@ -168,14 +162,11 @@ impl Tracker {
             let alone: Vec<Expectation> = trails.map(|trail| trail.expect(captured)).collect();
             sight.follow(captured, &alone, self.settings.follow_pixels);
         }
-        let mut tracking = sight.into_tracking();
-        if let Some(decimate) = self.due(image, captured, &tracking) {
-            self.last_search = Some(captured);
-            let mut sight =
-                Sight::new(image, &self.lens, self.detector.as_mut(), &mut self.refiner, &self.bodies);
-            sight.search(decimate, tracking);
-            tracking = sight.into_tracking();
+        let due = self.schedule.due(&self.settings, &self.trails, image, captured, sight.tracking());
+        if let Some(decimate) = due {
+            sight.search(decimate);
         }
+        let mut tracking = sight.into_tracking();
         self.remember(captured, &tracking.tags);
         self.solve(captured, &mut tracking);
         tracking
@@ -184,33 +175,13 @@ impl Tracker {
     /// Forgets all earlier images.
     pub fn forget(&mut self) {
         self.trails.clear();
-        (self.last_search, self.last_thorough) = (None, None);
+        self.schedule.start_anew();
         self.bodies.iter_mut().for_each(BodyTracker::forget);
     }
 
     /// The last poses of the body of that name: where it was when another sensor looked.
     pub fn history(&self, body: &str) -> Option<&PoseHistory> {
         self.bodies.iter().find(|own| own.name() == body).map(BodyTracker::history)
-    }
-
-    /// Whether the whole image is to be searched now, and how many times smaller.
-    fn due(&mut self, image: &Luma, captured: Timestamp, tracking: &Tracking) -> Option<u32> {
-        let settings = &self.settings;
-        let is_over =
-            |last: Option<Timestamp>, every| last.is_none_or(|last| captured.saturating_since(last) >= every);
-        if !settings.regions || is_over(self.last_thorough, settings.search_thoroughly_every) {
-            self.last_thorough = Some(captured);
-            return Some(1);
-        }
-        let nothing = tracking.tags.is_empty();
-        let all_at_once = nothing && self.trails.iter().any(|trail| trail.was_in(captured, LAST_FRAME));
-        let is_missing = |trail: &Trail| !tracking.has(trail.tag()) && trail.should_be_in(image, captured);
-        let missing = nothing || self.trails.iter().any(is_missing);
-        let (every, decimate) = match missing {
-            true => (settings.search_for_lost_every, DECIMATE_FOR_LOST),
-            false => (settings.search_for_new_every, DECIMATE_FOR_NEW),
-        };
-        (all_at_once || is_over(self.last_search, every)).then_some(decimate)
     }
 
     /// Where tags were, for the next image.

@@ -68,6 +68,11 @@ impl<'a> Sight<'a> {
         }
     }
 
+    /// What was seen so far.
+    pub(super) fn tracking(&self) -> &Tracking {
+        &self.tracking
+    }
+
     pub(super) fn into_tracking(self) -> Tracking {
         self.tracking
     }
@@ -83,7 +88,9 @@ impl<'a> Sight<'a> {
             }
         }
         self.pixels = (pixels / self.expected.len().max(1)).max(MIN_FOLLOW_PIXELS);
-        self.look(&self.expected.clone());
+        let expected = std::mem::take(&mut self.expected);
+        self.look(&expected);
+        self.expected = expected;
         for body in bodies {
             let own: Vec<Expectation> = alone.iter().filter(|seen| body.has(seen.tag)).copied().collect();
             self.follow_body(body, &own);
@@ -163,8 +170,8 @@ impl<'a> Sight<'a> {
     }
 
     /// Looks for tags in the whole image, made `decimate` times smaller, beside those that are known.
-    pub(super) fn search(&mut self, decimate: u32, known: Tracking) {
-        self.tracking = Tracking { searched: true, ..known };
+    pub(super) fn search(&mut self, decimate: u32) {
+        self.tracking.searched = true;
         match self.detector.find_coarsely(self.image, decimate) {
             Ok(found) => found.iter().for_each(|found| self.take(found)),
             Err(error) => self.tracking.warnings.push(error.to_string()),
